@@ -18,6 +18,7 @@ from .design.reduction import (
 from .design.sensitivity import (
     sensitivity as sensitivity,
 )
+from .estimators.by_name import minimise as minimise
 from .estimators.coefficient_history import (
     CoefficientHistory as CoefficientHistory,
 )
@@ -48,6 +49,10 @@ from .estimators.lssvm import (
 from .estimators.lssvm import (
     TruncatedLSSVM as TruncatedLSSVM,
 )
+from .estimators.optimisers import ArtificialBeeColony as ArtificialBeeColony
+from .estimators.optimisers import DifferentialEvolution as DifferentialEvolution
+from .estimators.optimisers import GridSearch as GridSearch
+from .estimators.optimisers import ParticleSwarm as ParticleSwarm
 from .estimators.polynomial import (
     polynomial_coefficients as polynomial_coefficients,
 )
@@ -61,50 +66,33 @@ from .estimators.recursive import (
     StochasticGradient as StochasticGradient,
 )
 from .estimators.rm_svm import RMSVM as RMSVM
+from .estimators.search import SearchResult as SearchResult
 from .estimators.tuned import TunedLSSVM as TunedLSSVM
-from .options import Options as Options
-from .pipeline import identify as identify
-from .regression.forces import (
-    ForceRegression as ForceRegression,
-)
-from .regression.forces import (
-    force_regression as force_regression,
-)
-from .regression.forces import (
-    identify_forces as identify_forces,
-)
-from .regression.preprocess import Preprocessing as Preprocessing
-from .regression.samples import Samples as Samples
-from .regression.samples import Sampling as Sampling
-from .regression.samples import build_samples as build_samples
-from .result import IdentificationResult as IdentificationResult
-from .search import (
-    ArtificialBeeColony as ArtificialBeeColony,
-)
-from .search import (
-    DifferentialEvolution as DifferentialEvolution,
-)
-from .search import (
-    GridSearch as GridSearch,
-)
-from .search import (
-    ParticleSwarm as ParticleSwarm,
-)
-from .search import (
-    SearchResult as SearchResult,
-)
-from .search import (
-    minimise as minimise,
-)
-from .simulation_error.prior_knowledge import PriorKnowledge as PriorKnowledge
-from .simulation_error.refinement import Refinement as Refinement
-from .uncertainty.uncertainty import Uncertainty as Uncertainty
-from .validation.comparison import (
+from .judging.comparison import (
     Comparison as Comparison,
 )
-from .validation.comparison import (
+from .judging.comparison import (
     compare_methods as compare_methods,
 )
-from .validation.comparison import (
+from .judging.comparison import (
     cross_validate as cross_validate,
 )
+from .judging.uncertainty import Uncertainty as Uncertainty
+from .models.prior_knowledge import PriorKnowledge as PriorKnowledge
+from .models.refinement import Refinement as Refinement
+from .options import Options as Options
+from .pipeline import identify as identify
+from .result import IdentificationResult as IdentificationResult
+from .samples.forces import (
+    ForceRegression as ForceRegression,
+)
+from .samples.forces import (
+    force_regression as force_regression,
+)
+from .samples.forces import (
+    identify_forces as identify_forces,
+)
+from .samples.preprocess import Preprocessing as Preprocessing
+from .samples.samples import Samples as Samples
+from .samples.samples import Sampling as Sampling
+from .samples.samples import build_samples as build_samples

@@ -9,9 +9,9 @@ import numpy as np
 
 if TYPE_CHECKING:
     from identification.estimators.estimator import Estimator
-    from identification.regression.samples import Samples
-    from identification.search import SearchResult
-    from identification.validation.diagnostics import EquationDiagnostics
+    from identification.estimators.search import SearchResult
+    from identification.judging.diagnostics import EquationDiagnostics
+    from identification.samples.samples import Samples
     from shipgym import ShipModel, Trial
 
 

@@ -10,13 +10,13 @@ import shipgym
 from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.linear import LinearRegressor
 from identification.estimators.methods import METHODS, make_method
-from identification.regression.preprocess import Preprocessing
-from identification.regression.samples import Sampling
-from identification.regression.still_water import check_current, check_wind
-from identification.simulation_error.prior_knowledge import PriorKnowledge
-from identification.simulation_error.refinement import Refinement
-from identification.uncertainty.uncertainty import Uncertainty
-from identification.validation.acceptance import check_accept
+from identification.judging.acceptance import check_accept
+from identification.judging.uncertainty import Uncertainty
+from identification.models.prior_knowledge import PriorKnowledge
+from identification.models.refinement import Refinement
+from identification.samples.preprocess import Preprocessing
+from identification.samples.samples import Sampling
+from identification.samples.still_water import check_current, check_wind
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.checks import check_choice, check_flag, check_number, check_text
 from shipgym.ships import Structure

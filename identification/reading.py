@@ -14,12 +14,12 @@ from typing import Any
 
 from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.methods import METHODS, make_method, method_options
+from identification.judging.uncertainty import Uncertainty
+from identification.models.prior_knowledge import PriorKnowledge
+from identification.models.refinement import Refinement
 from identification.options import DEFAULT_METHOD, MAP, Options
-from identification.regression.preprocess import Preprocessing
-from identification.regression.samples import Sampling
-from identification.simulation_error.prior_knowledge import PriorKnowledge
-from identification.simulation_error.refinement import Refinement
-from identification.uncertainty.uncertainty import Uncertainty
+from identification.samples.preprocess import Preprocessing
+from identification.samples.samples import Sampling
 from shipgym import InputError
 from shipgym.checks import check_choice, check_table, check_text, did_you_mean, placed
 

@@ -48,8 +48,8 @@ from agents.verification.closed_loop import ClosedLoop  # noqa: E402
 from agents.verification.refusal import why_refused  # noqa: E402
 from agents.verification.tracks import judged_task  # noqa: E402
 from identification import IdentificationResult, Preprocessing, identify  # noqa: E402
-from identification.regression.still_water import in_still_water  # noqa: E402
-from identification.validation.warnings import why_unstable  # noqa: E402
+from identification.judging.warnings import why_unstable  # noqa: E402
+from identification.samples.still_water import in_still_water  # noqa: E402
 from shipgym import ShipModel, Trial  # noqa: E402
 from shipgym.errors import InputError  # noqa: E402
 from shipgym.manoeuvres import turning_circle, zigzag  # noqa: E402

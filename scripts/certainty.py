@@ -35,7 +35,7 @@ if str(ROOT) not in sys.path:
 
 import shipgym  # noqa: E402 - the folder above has to be found first
 from identification import IdentificationResult, identify  # noqa: E402
-from identification.uncertainty.model_error import DEFAULT  # noqa: E402
+from identification.judging.model_error import DEFAULT  # noqa: E402
 from shipgym import ShipModel, Trial  # noqa: E402
 from shipgym.errors import InputError  # noqa: E402
 from shipgym.manoeuvres import (  # noqa: E402

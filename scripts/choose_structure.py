@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from certainty import TRIALS, sea_trials, ship_of
 
 from identification import IdentificationResult, identify
-from identification.validation.prediction import predict
+from identification.judging.prediction import predict
 from shipgym import ShipFile, ShipModel
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
 

@@ -22,12 +22,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from agents import LQ, load_agent
-from agents.deployment.autopilot_c99 import autopilot_source
-from agents.deployment.c99 import Source
-from agents.deployment.fmu import write_fmu
-from agents.deployment.ship_c99 import ship_source
-from agents.deployment.simulated import SimulatedShip, simulate_ship
-from agents.deployment.steering import steer
+from agents.export.autopilot_c99 import autopilot_source
+from agents.export.c99 import Source
+from agents.export.fmu import write_fmu
+from agents.export.ship_c99 import ship_source
+from agents.export.simulated import SimulatedShip, simulate_ship
+from agents.export.steering import steer
 from shipgym.ships import load_model
 
 CROSS = ("arm-linux-gnueabihf-gcc", "aarch64-linux-gnu-gcc")

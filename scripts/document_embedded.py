@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from agents import LQ, LQG, PID, AdaptiveLineOfSight, TurnRate, WheelOver, load_agent
-from agents.deployment.autopilot_c99 import autopilot_source
-from agents.deployment.c99 import Source
-from agents.deployment.ship_c99 import ship_source
+from agents.export.autopilot_c99 import autopilot_source
+from agents.export.c99 import Source
+from agents.export.ship_c99 import ship_source
 from shipgym.ships import load_model
 
 PAGE = Path(__file__).parents[1] / "docs" / "embedded.md"

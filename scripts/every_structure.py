@@ -41,12 +41,12 @@ if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
 from identification import IdentificationResult, identify  # noqa: E402
-from identification.validation.predicted import (  # noqa: E402
+from identification.judging.predicted import (  # noqa: E402
     predicted_channels,
     predicts_track,
 )
-from identification.validation.prediction import predict  # noqa: E402
-from identification.validation.selection import (  # noqa: E402
+from identification.judging.prediction import predict  # noqa: E402
+from identification.judging.selection import (  # noqa: E402
     RESPONSES,
     STRUCTURES,
     whole_trials,

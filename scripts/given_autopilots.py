@@ -36,7 +36,7 @@ from verdicts import SHIPS as OF_VERDICTS
 from agents.verification.chain import examined
 from agents.verification.verify import DESIGNS, design_autopilots, verify
 from identification import IdentificationResult, identify
-from identification.validation.selection import RESPONSES, whole_trials
+from identification.judging.selection import RESPONSES, whole_trials
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 

@@ -20,9 +20,9 @@ from itertools import pairwise
 from pathlib import Path
 
 from agents import PID
-from agents.deployment.helm import Helm
-from agents.deployment.nmea import sentences
-from agents.deployment.sensors import Limits
+from agents.export.helm import Helm
+from agents.export.nmea import sentences
+from agents.export.sensors import Limits
 from shipgym.ships import load_model
 
 HOST = "127.0.0.1"

@@ -25,10 +25,10 @@ from joblib import Parallel, delayed
 
 import agents
 from agents import LQ, PID, LineOfSight, TurnRate, WheelOver
-from agents.deployment.helm import MANUAL, STEERING, Helm
-from agents.deployment.route import Route
-from agents.deployment.sensors import Limits
-from agents.deployment.simulated import START, STEP, SimulatedShip
+from agents.export.helm import MANUAL, STEERING, Helm
+from agents.export.route import Route
+from agents.export.sensors import Limits
+from agents.export.simulated import START, STEP, SimulatedShip
 from shipgym import ShipModel, load_model
 from shipgym.tasks.guidance import wrapped
 from shipgym.tasks.task import Task

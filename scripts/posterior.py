@@ -30,14 +30,14 @@ for folder in (ROOT, ROOT / "scripts"):
 import certainty  # noqa: E402 - the folders above have to be found first
 
 from identification import identify  # noqa: E402
-from identification.simulation_error.whole_trials import WholeTrials  # noqa: E402
-from identification.uncertainty.coarsened import CoarsenedPosterior  # noqa: E402
-from identification.uncertainty.ensemble import sample_ensemble  # noqa: E402
-from identification.uncertainty.mixing import (  # noqa: E402
+from identification.judging.coarsened import CoarsenedPosterior  # noqa: E402
+from identification.judging.ensemble import sample_ensemble  # noqa: E402
+from identification.judging.mixing import (  # noqa: E402
     autocorrelation_times,
     mixing_of,
 )
-from identification.uncertainty.posterior import table_prior  # noqa: E402
+from identification.judging.posterior import table_prior  # noqa: E402
+from identification.models.whole_trials import WholeTrials  # noqa: E402
 from shipgym import Particulars, ShipModel, SteeringGear, Trial  # noqa: E402
 from shipgym.arrays import Floats  # noqa: E402
 from shipgym.manoeuvres import zigzag  # noqa: E402

@@ -50,7 +50,7 @@ env.reset(seed=0)
 assert env.render().shape == (600, 600, 3)
 """
 NMEA = """
-from agents.deployment.nmea import library, readings, sentences
+from agents.export.nmea import library, readings, sentences
 assert library("serial").VERSION
 assert readings(sentences("HEHDT,180.0,T").strip())[0].quantity == "heading"
 """

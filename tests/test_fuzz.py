@@ -24,9 +24,9 @@ from fuzzing.mutations import mutate
 from fuzzing.processes import chunks, run
 from fuzzing.reading import Kind
 
-from agents.deployment.helm import Helm
-from agents.deployment.nmea import sentences
-from agents.deployment.sensors import Limits
+from agents.export.helm import Helm
+from agents.export.nmea import sentences
+from agents.export.sensors import Limits
 from shipgym.errors import InputError
 from shipgym.files import read_json
 from shipgym.trials.guesses import guess_trial

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from agents import LQ, load_agent
 from agents.cli import app
-from agents.deployment.simulated import SimulatedShip, simulate_ship
+from agents.export.simulated import SimulatedShip, simulate_ship
 from shipgym import example_ship, load_model
 from tests.agents.steering import free_port
 

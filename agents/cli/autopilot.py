@@ -109,7 +109,7 @@ def autopilot_command(
 def print_autopilot(result: AutopilotResult, report: Path, draws: int) -> None:
     """Print the result; fail for an unstable model or if all designs are refused."""
     from agents.cli.terminal import answer, say, warn
-    from identification.validation.warnings import model_warnings
+    from identification.judging.warnings import model_warnings
 
     answer({**result.metrics, "report": str(report)})
     if result.verification is not None:
@@ -142,7 +142,7 @@ def _print_verification(
     """Print predictions, criteria, ranking and tracks."""
     from agents.cli import tables
     from agents.cli.terminal import console, say, warn
-    from identification.validation.warnings import held_out_error
+    from identification.judging.warnings import held_out_error
 
     manoeuvres = verification.manoeuvres
     say(held_out_error(result.identification))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Argument, Option
 
 if TYPE_CHECKING:
-    from agents.deployment.c99 import Source
+    from agents.export.c99 import Source
 
 
 def export_command(
@@ -121,7 +121,7 @@ def _write(
 ) -> None:
     """Check all files before any is written; write first what may still fail."""
     from agents.agent_file import load_agent
-    from agents.deployment.fmu import check_fmu_name, write_fmu
+    from agents.export.fmu import check_fmu_name, write_fmu
     from agents.output import check_file, check_folder, whole_folder
     from agents.policies.onnx_export import onnx_model
     from shipgym.files import write_bytes
@@ -151,8 +151,8 @@ def _write(
 def _source(what: str, name: str | None, depth: float, real: str) -> Source:
     """C99 of the controller, policy or model of a file or a name."""
     from agents.agent_file import list_pretrained, load_agent
-    from agents.deployment.autopilot_c99 import autopilot_source
-    from agents.deployment.ship_c99 import ship_source
+    from agents.export.autopilot_c99 import autopilot_source
+    from agents.export.ship_c99 import ship_source
     from shipgym.errors import InputError
     from shipgym.files import read_json
     from shipgym.ships import load_model

@@ -98,8 +98,8 @@ def _identify(
     from agents.cli.terminal import answer, console, identifying, say
     from agents.identifying import identify_ship
     from agents.output import whole_folder
+    from identification.judging.warnings import held_out_error, why_unstable
     from identification.result import FILES
-    from identification.validation.warnings import held_out_error, why_unstable
 
     with whole_folder(out, FILES) as draft, identifying("identifying"):
         result = identify_ship(read, settings)
@@ -128,7 +128,7 @@ def _identify(
 def _check_stable(result: IdentificationResult) -> None:
     """Fail for an unstable model, else warn of what has to be known."""
     from agents.cli.terminal import warn
-    from identification.validation.warnings import model_warnings, why_unstable
+    from identification.judging.warnings import model_warnings, why_unstable
 
     if (instability := why_unstable(result)) is not None:
         fail(
@@ -152,7 +152,7 @@ def _compare(
     from agents.cli.terminal import answer, console, identifying, say, warn
     from agents.identifying import compare_ship
     from agents.output import whole_folder
-    from identification.validation.comparison import COMPARISON_FILES
+    from identification.judging.comparison import COMPARISON_FILES
 
     own = () if read.structure is None else (f"model-{read.structure.name}.json",)
     with (

@@ -131,9 +131,9 @@ def steer_command(
 
     from agents.agent_file import load_agent
     from agents.cli.terminal import console, say, warn
-    from agents.deployment.panel import has_screen, helm_panel, steer_with
-    from agents.deployment.route import Route
-    from agents.deployment.sensors import Limits
+    from agents.export.panel import has_screen, helm_panel, steer_with
+    from agents.export.route import Route
+    from agents.export.sensors import Limits
     from shipgym.checks import check_keys
     from shipgym.files import named_values
 
@@ -238,7 +238,7 @@ def simulate_command(
     import asyncio
 
     from agents.cli.terminal import answer, say
-    from agents.deployment.simulated import STEP, SimulatedShip, simulate_ship
+    from agents.export.simulated import STEP, SimulatedShip, simulate_ship
     from shipgym.checks import check_number
     from shipgym.files import named_values
     from shipgym.ships import load_model

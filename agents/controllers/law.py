@@ -3,7 +3,7 @@
 A law is a plain function `law(seen, memory, parameters) -> (order, memory)` of
 arithmetic, NumPy's functions and `np.where`. Each number in its records is a float, or
 an array with one entry for each of many ships, so that Python steers one ship or many;
-`agents.deployment.translator` writes the same function as C99. A memory of zeros is
+`agents.export.translator` writes the same function as C99. A memory of zeros is
 that of an episode that begins.
 """
 

@@ -25,10 +25,10 @@ from agents.verification.result import AutopilotResult, Pilot, Verification
 from agents.verification.tracks import Track
 from agents.verification.verify import DESIGNS, verify
 from identification import IdentificationResult, identify
+from identification.judging.selection import RESPONSES
+from identification.judging.warnings import why_unstable
+from identification.models.refinement import whole_trials
 from identification.progress import PROGRESS, Progress
-from identification.simulation_error.refinement import whole_trials
-from identification.validation.selection import RESPONSES
-from identification.validation.warnings import why_unstable
 from shipgym.checks import check_number, placed, quoted
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.extras import library

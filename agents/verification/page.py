@@ -13,8 +13,8 @@ from agents.verification.view import (
     verification_view,
 )
 from identification import IdentificationResult
+from identification.judging.warnings import held_out_error
 from identification.report.view import fit_view, trial_figures
-from identification.validation.warnings import held_out_error
 from shipgym.files import write_text
 from shipgym.pages import NONE, render
 

@@ -14,7 +14,7 @@ import numpy as np
 from agents.controllers.controller import Controller
 from agents.controllers.lqg import LQG
 from agents.controllers.turn_rate import TurnRate
-from agents.deployment.sensors import Limits
+from agents.export.sensors import Limits
 from agents.verification.steered import (
     LOST_S,
     SteeredRun,

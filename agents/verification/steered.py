@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from agents.controllers.controller import Controller
-from agents.deployment.helm import Helm
-from agents.deployment.nmea import NmeaReading
-from agents.deployment.route import Route
-from agents.deployment.sensors import Limits
-from agents.deployment.simulated import MINUTE, START, SimulatedShip
+from agents.export.helm import Helm
+from agents.export.nmea import NmeaReading
+from agents.export.route import Route
+from agents.export.sensors import Limits
+from agents.export.simulated import MINUTE, START, SimulatedShip
 from agents.verification.tracks import Track, track_task
 from shipgym.arrays import Floats
 from shipgym.ships import ShipModel

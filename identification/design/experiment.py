@@ -26,8 +26,8 @@ from identification.design.information import (
     uncertainty,
 )
 from identification.design.sensitivity import table_of
+from identification.judging.hard_turn import hard_turn_features
 from identification.text import as_text, lined_table
-from identification.validation.hard_turn import hard_turn_features
 from shipgym import InputError, ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice

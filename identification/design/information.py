@@ -11,12 +11,12 @@ import numpy as np
 
 from identification.arrays import by_name, mean_square
 from identification.design.sensitivity import table_of
-from identification.regression.samples import Samples, build_samples
-from identification.validation.diagnostics import (
+from identification.judging.diagnostics import (
     JITTER,
     scaled_features,
     variance_inflation,
 )
+from identification.samples.samples import Samples, build_samples
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.trials.resampling import usual_step

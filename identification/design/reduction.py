@@ -16,13 +16,13 @@ from rich.table import Table
 
 from identification.arrays import by_name, column_rms
 from identification.estimators.lssvm import TruncatedLSSVM
-from identification.text import as_text
-from identification.validation.diagnostics import (
+from identification.judging.diagnostics import (
     COLLINEAR,
     JITTER,
     correlation_matrix,
     variance_inflation,
 )
+from identification.text import as_text
 from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_number

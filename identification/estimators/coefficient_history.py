@@ -9,7 +9,7 @@ from sklearn.base import clone
 
 from identification.estimators.methods import get_method
 from identification.estimators.recursive import Recursion
-from identification.regression.samples import Samples, build_samples
+from identification.samples.samples import Samples, build_samples
 from shipgym import InputError, Particulars, Trial
 from shipgym.arrays import Floats, Integers
 from shipgym.checks import check_choice

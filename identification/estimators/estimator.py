@@ -7,7 +7,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from identification.regression.samples import Samples
+from identification.samples.samples import Samples
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
 

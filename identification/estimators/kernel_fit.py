@@ -20,8 +20,8 @@ from identification.estimators.estimator import Estimators
 from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.rm_svm import heading_error, most_regularised
-from identification.regression.samples import Samples
-from identification.validation.folds import held_out_rows
+from identification.judging.folds import held_out_rows
+from identification.samples.samples import Samples
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats, finite
 from shipgym.ships import GreyBox, Structure

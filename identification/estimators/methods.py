@@ -13,8 +13,8 @@ from identification.estimators.adapted import Adapted
 from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.linear import LinearRegressor
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
-from identification.regression.samples import Samples
-from identification.simulation_error.refinement import Refinement
+from identification.models.refinement import Refinement
+from identification.samples.samples import Samples
 from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, quoted

@@ -22,10 +22,10 @@ from sklearn.svm import SVR, LinearSVR
 from identification.arrays import column_rms, mean_square, root_mean_square
 from identification.estimators.estimator import Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, validated
-from identification.search.pattern_search import pattern_search
-from identification.search.search import BAND, SearchResult
-from identification.validation.folds import FOLDS, TRIALS, held_out_rows
-from identification.validation.prediction import predict
+from identification.estimators.pattern_search import pattern_search
+from identification.estimators.search import BAND, SearchResult
+from identification.judging.folds import FOLDS, TRIALS, held_out_rows
+from identification.judging.prediction import predict
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, check_flag, check_number, check_whole

@@ -9,20 +9,20 @@ from numpy.typing import ArrayLike
 from sklearn.base import clone
 
 from identification.arrays import mean_square
+from identification.estimators.by_name import OPTIMISERS, get_optimiser
 from identification.estimators.decomposition import check_scale, decompose
 from identification.estimators.estimator import Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, check_weight, validated
 from identification.estimators.lssvm import LSSVM
-from identification.search.by_name import OPTIMISERS, get_optimiser
-from identification.search.objectives import (
+from identification.estimators.objectives import (
     ErrorOfC,
     check_folds,
     held_out_error,
     time_blocks,
     training_error,
 )
-from identification.search.search import Optimiser, SearchResult
-from identification.validation.prediction import predict
+from identification.estimators.search import Optimiser, SearchResult
+from identification.judging.prediction import predict
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_flag, check_whole

@@ -5,15 +5,15 @@ from typing import Any
 
 from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.threads import single_threaded
+from identification.judging.acceptance import unaccepted
+from identification.judging.uncertainty import Uncertainty
+from identification.models.prior_knowledge import PriorKnowledge
 from identification.options import AUTO, Given, Options, stage
 from identification.pipeline.by_regression import by_regression
 from identification.progress import announce
-from identification.regression.preprocess import Preprocessing
-from identification.regression.samples import Sampling
 from identification.result import IdentificationResult
-from identification.simulation_error.prior_knowledge import PriorKnowledge
-from identification.uncertainty.uncertainty import Uncertainty
-from identification.validation.acceptance import unaccepted
+from identification.samples.preprocess import Preprocessing
+from identification.samples.samples import Sampling
 from shipgym import ShipModel, SteeringGear, Trial
 from shipgym.ships import Structure
 from shipgym.ships.structures import MMG

@@ -10,23 +10,23 @@ import numpy as np
 
 from identification.estimators.estimator import FitTask
 from identification.estimators.methods import Method, get_method
+from identification.judging.guard import (
+    GuardedFit,
+    guarded_fit,
+    with_coefficients,
+)
+from identification.judging.model_error import without_trials
+from identification.judging.predicted import is_yaw_alone
+from identification.judging.rudder_bias import with_bias
+from identification.models.refinement import Refinement, whole_trials
 from identification.options import Options, name_of
 from identification.pipeline.evaluation import (
     MEMORY,
     provenance_of,
     with_uncertainty,
 )
-from identification.regression.problem import Problem, held_out, pose
 from identification.result import IdentificationResult
-from identification.simulation_error.refinement import Refinement, whole_trials
-from identification.uncertainty.model_error import without_trials
-from identification.validation.guard import (
-    GuardedFit,
-    guarded_fit,
-    with_coefficients,
-)
-from identification.validation.predicted import is_yaw_alone
-from identification.validation.rudder_bias import with_bias
+from identification.samples.problem import Problem, held_out, pose
 from shipgym import ShipModel, Trial, list_structures
 from shipgym.arrays import Floats
 from shipgym.ships import Structure, get_structure
@@ -34,7 +34,7 @@ from shipgym.ships.structures import GREY_BOX
 from shipgym.trials.resampling import usual_step
 
 if TYPE_CHECKING:
-    from identification.simulation_error.refine import Refined
+    from identification.models.refine import Refined
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +217,7 @@ def _asked_method(options: Options, blank: ShipModel) -> Method:
     if options.prior is None:
         return method
 
-    from identification.simulation_error.pulled import with_prior
+    from identification.models.pulled import with_prior
 
     return with_prior(method, options.prior, blank)
 
@@ -229,7 +229,7 @@ def _refined(
     if method.refinement is None:
         return None
 
-    from identification.simulation_error.refine import refine
+    from identification.models.refine import refine
 
     memory = MEMORY * task.blank.travel_time
     return refine(fit, task, method.refinement, memory, rounds)

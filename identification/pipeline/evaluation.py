@@ -9,41 +9,41 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import shipgym
+from identification.judging.bootstrap import (
+    bootstrap_covariance,
+    influence_covariance,
+)
+from identification.judging.covariance import (
+    coefficient_covariance,
+    joint_covariance,
+)
+from identification.judging.diagnostics import diagnose
+from identification.judging.extrapolation import Without, beyond_trials
+from identification.judging.guard import GuardedFit, with_coefficients
+from identification.judging.model_error import (
+    FEWEST_TRIALS,
+    model_error,
+    without_trial,
+)
+from identification.judging.predicted import is_yaw_alone
+from identification.judging.prediction import predict, trial_metrics
+from identification.judging.rudder_bias import rudder_bias
+from identification.judging.uncertainty import Uncertainty
 from identification.options import (
     Options,
     name_of,
     provenance_settings,
     whole_call,
 )
-from identification.regression.problem import Problem
-from identification.regression.samples import Samples
 from identification.result import IdentificationResult
-from identification.uncertainty.bootstrap import (
-    bootstrap_covariance,
-    influence_covariance,
-)
-from identification.uncertainty.covariance import (
-    coefficient_covariance,
-    joint_covariance,
-)
-from identification.uncertainty.extrapolation import Without, beyond_trials
-from identification.uncertainty.model_error import (
-    FEWEST_TRIALS,
-    model_error,
-    without_trial,
-)
-from identification.uncertainty.uncertainty import Uncertainty
-from identification.validation.diagnostics import diagnose
-from identification.validation.guard import GuardedFit, with_coefficients
-from identification.validation.predicted import is_yaw_alone
-from identification.validation.prediction import predict, trial_metrics
-from identification.validation.rudder_bias import rudder_bias
+from identification.samples.problem import Problem
+from identification.samples.samples import Samples
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.ships import GreyBox
 
 if TYPE_CHECKING:
-    from identification.simulation_error.refine import Refined
+    from identification.models.refine import Refined
 
 MEMORY = 1.0  # of residuals, in the time to sail one ship length
 
@@ -145,7 +145,7 @@ def with_uncertainty(
     if error:
         provenance = provenance | {"model_error": error}
     if by_sampling:
-        from identification.uncertainty.posterior import table_prior, with_posterior
+        from identification.judging.posterior import table_prior, with_posterior
 
         prior = table_prior(model)
         asked = options.uncertainty
@@ -324,7 +324,7 @@ def _accuracy(
         for trial in trials
     }
     if isinstance(problem.table, GreyBox):
-        from identification.regression.grey_box import bare_metrics
+        from identification.samples.grey_box import bare_metrics
 
         metrics["reference"] = bare_metrics(model, trials)
     return metrics

@@ -17,6 +17,14 @@ from identification.estimators.kernel_fit import (
 )
 from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.rm_svm import RMSVM
+from identification.judging.extrapolation import beyond_trials
+from identification.judging.guard import GuardedFit, reasons_unstable
+from identification.judging.selection import select
+from identification.models.maximum_a_posteriori import (
+    MMGFit,
+    checked_mmg,
+    fit_mmg,
+)
 from identification.options import AUTO, MAP, Options, name_of, whole_call
 from identification.pipeline.by_regression import (
     RegressionFit,
@@ -28,19 +36,11 @@ from identification.pipeline.evaluation import (
     provenance_of,
     with_uncertainty,
 )
-from identification.regression.grey_box import explained_samples
-from identification.regression.preprocess import smoothed_channels
-from identification.regression.problem import Problem, held_out, pose
-from identification.regression.still_water import in_still_water
 from identification.result import IdentificationResult
-from identification.simulation_error.maximum_a_posteriori import (
-    MMGFit,
-    checked_mmg,
-    fit_mmg,
-)
-from identification.uncertainty.extrapolation import beyond_trials
-from identification.validation.guard import GuardedFit, reasons_unstable
-from identification.validation.selection import select
+from identification.samples.grey_box import explained_samples
+from identification.samples.preprocess import smoothed_channels
+from identification.samples.problem import Problem, held_out, pose
+from identification.samples.still_water import in_still_water
 from shipgym import InputError, ShipModel, Trial
 from shipgym.checks import quoted
 from shipgym.ships import GreyBox
@@ -242,7 +242,7 @@ class SimulationFit:
         report = dict(self.fit.report)
         asked = options.uncertainty
         if asked.by_sampling:
-            from identification.uncertainty.posterior import with_posterior
+            from identification.judging.posterior import with_posterior
 
             prior = self.fit.posterior.coefficient_prior
             model, posterior = with_posterior(model, problem.used, prior, asked)

@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimators.lssvm import TruncatedLSSVM
+from identification.estimators.search import BAND, LOG_C, SearchResult
 from identification.fit import Fit
-from identification.search import SearchResult
-from identification.search.search import BAND, LOG_C
-from identification.validation.warnings import EQUATIONS
+from identification.judging.warnings import EQUATIONS
 from shipgym.arrays import Floats
 from shipgym.plots import PALETTE, Panel, axis, compact, line, panels, points
 from shipgym.plots.style import LIMIT, MUTED, Figure

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from identification.judging.ranking import RankedFit, Ranking
 from identification.report.predictions import rows_of_two
-from identification.validation.ranking import RankedFit, Ranking
 from shipgym import Trial
 from shipgym.arrays import Floats
 from shipgym.pages import render

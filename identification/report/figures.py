@@ -6,6 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.fit import Fit
+from identification.judging.covariance import residuals
+from identification.judging.diagnostics import (
+    autocorrelation,
+    cross_correlation,
+    without_overlap,
+)
+from identification.judging.warnings import EQUATIONS
 from identification.report.choice_figures import (
     l_curve_figure,
     search_figure,
@@ -13,13 +20,6 @@ from identification.report.choice_figures import (
 )
 from identification.report.coefficient_figure import coefficients_figure
 from identification.report.predictions import overview_figure, prediction_figure
-from identification.uncertainty.covariance import residuals
-from identification.validation.diagnostics import (
-    autocorrelation,
-    cross_correlation,
-    without_overlap,
-)
-from identification.validation.warnings import EQUATIONS
 from shipgym.arrays import Floats, Integers
 from shipgym.manoeuvres.quantiles import NORMAL_95
 from shipgym.plots import (

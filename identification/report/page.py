@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from identification.fit import Fit
+from identification.judging.warnings import why_unstable
 from identification.report.coefficient_figure import coefficients_figure
 from identification.report.figures import regression_figures
 from identification.report.view import fit_view, trial_figures
-from identification.validation.warnings import why_unstable
 from shipgym.pages import NONE, render
 
 

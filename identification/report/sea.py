@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from identification.fit import Fit
-from identification.regression.velocities import SIGNIFICANT
 from identification.report.predictions import rows_of_two
+from identification.samples.velocities import SIGNIFICANT
 from shipgym import Trial
 from shipgym.manoeuvres.quantiles import NORMAL_95
 from shipgym.plots import LIMIT, MEASURED, MODEL, Panel, axis, line, panels

@@ -8,6 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from identification.fit import Fit
+from identification.judging.diagnostics import EquationDiagnostics
+from identification.judging.rudder_bias import bias_sentences
+from identification.judging.warnings import (
+    EQUATIONS,
+    heading_errors_deg,
+    held_out_error,
+    model_warnings,
+    undetermined,
+)
 from identification.report.predictions import overview_figure, prediction_figure
 from identification.report.sea import sea_sentences, track_figure
 from identification.report.summary import (
@@ -30,15 +39,6 @@ from identification.report.tables import (
     trial_row,
 )
 from identification.report.turns import turn_sentences
-from identification.validation.diagnostics import EquationDiagnostics
-from identification.validation.rudder_bias import bias_sentences
-from identification.validation.warnings import (
-    EQUATIONS,
-    heading_errors_deg,
-    held_out_error,
-    model_warnings,
-    undetermined,
-)
 from shipgym.pages import NONE, fixed, number
 from shipgym.pages.numbers import counted
 from shipgym.plots.style import Figure

@@ -22,10 +22,10 @@ from agents.benchmarking.cells import Cell, job_of, run_job
 from agents.benchmarking.entries import Entry
 from agents.benchmarking.results import collect
 from agents.cli.benchmark_tables import costs_table, ranking_table
-from agents.deployment.helm import Helm
-from agents.deployment.nmea import Line
-from agents.deployment.route import Route
-from agents.deployment.sensors import Limits
+from agents.export.helm import Helm
+from agents.export.nmea import Line
+from agents.export.route import Route
+from agents.export.sensors import Limits
 from agents.job_results import (
     KeptResults,
     job_to_json,

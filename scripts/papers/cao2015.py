@@ -19,7 +19,7 @@ from scipy.stats import spearmanr
 from identification.design.sensitivity import sensitivity
 from identification.estimators.lssvm import LSSVM
 from identification.pipeline import identify
-from identification.regression.samples import build_samples
+from identification.samples.samples import build_samples
 from papers.row import Conclusion, Paper, Row
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.ships import ShipModel, load_model

@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.estimators.coefficient_history import coefficient_history
 from identification.estimators.recursive import MultiInnovationLeastSquares
-from identification.validation.prediction import predict
+from identification.judging.prediction import predict
 from papers import (
     cao2015,
     comparators,

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from identification.simulation_error.similarity import correlations, select_reference
+from identification.models.similarity import correlations, select_reference
 from papers.mei2019_targets import (
     SHOWN,
     TANKER,

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from identification import RMSVM
 from identification.estimators.methods import fit_all, get_method
+from identification.judging.folds import LARGEST_RUDDER, TRIALS
+from identification.judging.guard import with_coefficients
+from identification.models.similarity import select_reference
 from identification.pipeline import identify
-from identification.regression.samples import build_samples
 from identification.result import IdentificationResult
-from identification.simulation_error.similarity import select_reference
-from identification.validation.folds import LARGEST_RUDDER, TRIALS
-from identification.validation.guard import with_coefficients
+from identification.samples.samples import build_samples
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
 from shipgym.ships import GreyBox, ShipModel, converted_model, get_structure, load_model

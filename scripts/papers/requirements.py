@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimators.lssvm import LSSVM
+from identification.estimators.objectives import held_out_error, time_blocks
 from identification.estimators.tuned import TunedLSSVM
 from identification.pipeline import identify
-from identification.regression.samples import Samples, build_samples
 from identification.result import IdentificationResult
-from identification.search.objectives import held_out_error, time_blocks
+from identification.samples.samples import Samples, build_samples
 from papers.row import Paper, Requirement, Row
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import get_structure, load_model, register_structure

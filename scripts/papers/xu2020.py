@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from identification.design.reduction import Reduction
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
-from identification.regression.forces import (
+from identification.samples.forces import (
     FORCES,
     ForceRegression,
     fit_forces,

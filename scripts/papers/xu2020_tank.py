@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.design.reduction import Reduction, backward_elimination
-from identification.regression.forces import FORCES, ForceRegression, force_regression
+from identification.samples.forces import FORCES, ForceRegression, force_regression
 from shipgym.manoeuvres.towing_tank import (
     Tank,
     pure_surge,

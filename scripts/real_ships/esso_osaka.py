@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from identification import Preprocessing
+from identification.judging.prediction import predict
 from identification.pipeline import identify
-from identification.validation.prediction import predict
 from real_ships.data import Data, MeasuredShip
 from real_ships.measures import Floats
 from real_ships.section import Section, number, table
@@ -175,7 +175,7 @@ def _size(ship: MeasuredShip) -> list[str]:
 
 def _repaired(ship: MeasuredShip) -> str:
     """How many values of u the repair replaces, by run."""
-    from identification.regression.preprocess import repaired
+    from identification.samples.preprocess import repaired
 
     counts = {
         name: dict(repaired(trial).repaired)

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from identification.judging.guard import reasons_unstable
+from identification.judging.prediction import predict
 from identification.pipeline import identify
-from identification.validation.guard import reasons_unstable
-from identification.validation.prediction import predict
 from real_ships.data import Data, MeasuredShip
 from real_ships.measures import (
     MEASURES,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from identification.judging.prediction import predict, trial_metrics
 from identification.pipeline import identify
-from identification.validation.prediction import predict, trial_metrics
 from real_ships.data import Data, MeasuredShip
 from real_ships.marin import MEASURED_ROW, SHIP, TURNS, painter
 from real_ships.measures import (

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from identification import PriorKnowledge
+from identification.judging.closed_loop import closed_loop
 from identification.pipeline import identify
-from identification.validation.closed_loop import closed_loop
 from real_ships.data import Data, MeasuredShip
 from real_ships.hsva import SHIP as HSVA
 from real_ships.marin import SHIP as MARIN

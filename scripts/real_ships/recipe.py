@@ -15,12 +15,12 @@ import numpy as np
 from identification import PriorKnowledge, Refinement
 from identification.estimators.estimator import FitTask
 from identification.estimators.methods import get_method
+from identification.judging.guard import reasons_unstable, with_coefficients
+from identification.models.prior import Prior, reference_prior
+from identification.models.pulled import Pulled
 from identification.pipeline import identify
-from identification.regression.samples import build_samples
 from identification.result import IdentificationResult
-from identification.simulation_error.prior import Prior, reference_prior
-from identification.simulation_error.pulled import Pulled
-from identification.validation.guard import reasons_unstable, with_coefficients
+from identification.samples.samples import build_samples
 from real_ships.data import MeasuredShip
 from real_ships.measures import zigzag_errors
 from shipgym.ships import ShipModel, get_structure, register_structure

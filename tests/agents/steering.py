@@ -5,7 +5,7 @@ import asyncio
 import selectors
 import socket
 
-from agents.deployment.nmea import sentences
+from agents.export.nmea import sentences
 
 
 def sentence(address, *fields):

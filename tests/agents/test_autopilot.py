@@ -18,7 +18,7 @@ from agents.verification.page import write_report
 from agents.verification.result import verification_metrics
 from agents.verification.tracks import keep_track
 from identification import identify
-from identification.validation.warnings import model_warnings
+from identification.judging.warnings import model_warnings
 from shipgym import InputError, ShipFile, load_model
 from shipgym.manoeuvres import Criterion, IndexInterval
 from tests.agents.policies import random_policy

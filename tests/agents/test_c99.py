@@ -30,11 +30,11 @@ from agents.cli import app
 from agents.controllers.guided import TURNS, bend
 from agents.controllers.law import Turns
 from agents.controllers.quiet_lq import QuietLQ
-from agents.deployment.autopilot import Autopilot, BridgeInput
-from agents.deployment.autopilot_c99 import autopilot_source
-from agents.deployment.c99 import checked_name, degrees, heading, knots, single
-from agents.deployment.ship_c99 import ShipInput, advance, ship_source
-from agents.deployment.variables import AUTOPILOT_INPUTS
+from agents.export.autopilot import Autopilot, BridgeInput
+from agents.export.autopilot_c99 import autopilot_source
+from agents.export.c99 import checked_name, degrees, heading, knots, single
+from agents.export.ship_c99 import ShipInput, advance, ship_source
+from agents.export.variables import AUTOPILOT_INPUTS
 from shipgym.engine.motion import Motion
 from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError

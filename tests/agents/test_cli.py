@@ -426,7 +426,7 @@ def built(monkeypatch):
 
     monkeypatch.setattr("agents.verification.chain.build_autopilot", build)
     monkeypatch.setattr(
-        "identification.validation.warnings.model_warnings", lambda _: ["odd sway"]
+        "identification.judging.warnings.model_warnings", lambda _: ["odd sway"]
     )
     return result
 

@@ -19,12 +19,12 @@ import pytest
 from fmpy import fmi2, fmi3, validation
 
 from agents import LQ, TurnRate, WheelOver
-from agents.deployment import fmu
-from agents.deployment.autopilot import Autopilot
-from agents.deployment.autopilot_c99 import autopilot_source
-from agents.deployment.fmu import write_fmu
-from agents.deployment.ship_c99 import ship_source
-from agents.deployment.units_text import unit_powers
+from agents.export import fmu
+from agents.export.autopilot import Autopilot
+from agents.export.autopilot_c99 import autopilot_source
+from agents.export.fmu import write_fmu
+from agents.export.ship_c99 import ship_source
+from agents.export.units_text import unit_powers
 from shipgym.errors import InputError
 from shipgym.sea import Current, Weather, Wind
 from shipgym.tasks.task import Task

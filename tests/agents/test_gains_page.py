@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, PreviewLQ, TurnRate, WheelOver
-from agents.deployment.autopilot import Autopilot
+from agents.export.autopilot import Autopilot
 from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER
 

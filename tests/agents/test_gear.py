@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 
 from agents import PID
 from agents.cli import app
-from agents.deployment.nmea import Line
-from agents.deployment.simulated import SimulatedShip, simulate_ship
-from agents.deployment.steering import HelmObserver, steer
+from agents.export.nmea import Line
+from agents.export.simulated import SimulatedShip, simulate_ship
+from agents.export.steering import HelmObserver, steer
 from tests.agents.policies import MARINER
 from tests.agents.steering import free_port, no_waiting, sentence
 

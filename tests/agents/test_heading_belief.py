@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from agents import PID
-from agents.deployment.heading_belief import HeadingBelief
-from agents.deployment.nmea import NmeaReading
-from agents.deployment.residuals import false_alarms
-from agents.deployment.sensors import HelmSensors, Limits
-from agents.deployment.simulated import simulate_ship
-from agents.deployment.steering import steer
+from agents.export.heading_belief import HeadingBelief
+from agents.export.nmea import NmeaReading
+from agents.export.residuals import false_alarms
+from agents.export.sensors import HelmSensors, Limits
+from agents.export.simulated import simulate_ship
+from agents.export.steering import steer
 from tests.agents.policies import MARINER
 from tests.agents.steering import free_port, no_waiting
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, PreviewLQ, TurnRate, WheelOver, load_agent
-from agents.deployment.helm import MANUAL, STANDBY, STEERING, Helm
-from agents.deployment.nmea import NmeaReading
-from agents.deployment.route import Route
-from agents.deployment.sensors import HelmSensors, Limits
+from agents.export.helm import MANUAL, STANDBY, STEERING, Helm
+from agents.export.nmea import NmeaReading
+from agents.export.route import Route
+from agents.export.sensors import HelmSensors, Limits
 from shipgym.errors import InputError
 from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, IntegralLineOfSight, TurnRate, WheelOver
-from agents.deployment.helm import Helm
-from agents.deployment.helm_commands import MANUAL, STANDBY, STEERING
-from agents.deployment.nmea import NmeaReading
-from agents.deployment.route import Route
-from agents.deployment.sensors import Limits
+from agents.export.helm import Helm
+from agents.export.helm_commands import MANUAL, STANDBY, STEERING
+from agents.export.nmea import NmeaReading
+from agents.export.route import Route
+from agents.export.sensors import Limits
 from shipgym.errors import InputError
 from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER

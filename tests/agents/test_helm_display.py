@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from agents import PID
-from agents.deployment.display import (
+from agents.export.display import (
     KEYS,
     HelmView,
     Missing,
@@ -28,13 +28,13 @@ from agents.deployment.display import (
     rendered,
     sided,
 )
-from agents.deployment.heard import HeardSentences
-from agents.deployment.helm import Helm
-from agents.deployment.helm_commands import MANUAL, STANDBY, STEERING
-from agents.deployment.keys import commands_of, keyboard
-from agents.deployment.panel import HelmPanel
-from agents.deployment.screen import Screen
-from agents.deployment.sensors import Limits
+from agents.export.heard import HeardSentences
+from agents.export.helm import Helm
+from agents.export.helm_commands import MANUAL, STANDBY, STEERING
+from agents.export.keys import commands_of, keyboard
+from agents.export.panel import HelmPanel
+from agents.export.screen import Screen
+from agents.export.sensors import Limits
 from tests.agents.policies import MARINER
 from tests.agents.steering import free_port, sentence
 

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from agents import PID
 from agents.cli import app
-from agents.deployment.display import KEYS
-from agents.deployment.web_page import HelmPage
+from agents.export.display import KEYS
+from agents.export.web_page import HelmPage
 from shipgym.errors import InputError
 from tests.agents.browser import COMMAND, Browser
 from tests.agents.policies import MARINER

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, IntegralLineOfSight
-from agents.deployment.helm import MANUAL, STANDBY, STEERING, Helm
-from agents.deployment.nmea import NmeaReading
-from agents.deployment.sensors import HelmSensors, Limits
+from agents.export.helm import MANUAL, STANDBY, STEERING, Helm
+from agents.export.nmea import NmeaReading
+from agents.export.sensors import HelmSensors, Limits
 from tests.agents.policies import MARINER
 from tests.agents.steering import sentence
 

@@ -17,8 +17,8 @@ from agents.identifying import (
     reduce_ship,
 )
 from identification.estimators.methods import METHODS
+from identification.judging import selection
 from identification.reading import ARGUMENTS, stage_settings
-from identification.validation import selection
 from shipgym import InputError, ShipFile, list_structures, load_model
 
 #: The table of terms that the documentation shows.

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from agents.deployment import nmea
-from agents.deployment.nmea import Line, Link, readings
+from agents.export import nmea
+from agents.export.nmea import Line, Link, readings
 from shipgym.errors import InputError
 from tests.agents.steering import free_port, sentence
 

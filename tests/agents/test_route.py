@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from agents.deployment.route import Route
+from agents.export.route import Route
 from shipgym.errors import InputError
 
 #: Of a degree of latitude on the equator, of longitude there; WGS 84.

@@ -12,11 +12,11 @@ from typer.testing import CliRunner
 
 from agents import PID
 from agents.cli import app
-from agents.deployment.helm import Helm
-from agents.deployment.panel import HelmPanel
-from agents.deployment.sensors import Limits
-from agents.deployment.sentence_log import SentenceLog
-from agents.deployment.simulated import SimulatedShip
+from agents.export.helm import Helm
+from agents.export.panel import HelmPanel
+from agents.export.sensors import Limits
+from agents.export.sentence_log import SentenceLog
+from agents.export.simulated import SimulatedShip
 from shipgym.errors import InputError
 from shipgym.trials.nmea import checksum
 from tests.agents.policies import MARINER
@@ -147,7 +147,7 @@ def test_a_kill_loses_at_most_a_second(tmp_path):
     script = f"""
 import time
 from pathlib import Path
-from agents.deployment.sentence_log import SentenceLog
+from agents.export.sentence_log import SentenceLog
 log = SentenceLog(Path({str(path)!r}), time.time())
 while True:
     log.take("$HEHDT,90.0,T*16", "in-a:1", time.time())

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, PreviewLQ
-from agents.deployment.steering import Limits
+from agents.export.steering import Limits
 from agents.verification.standards import (
     REQUIREMENTS,
     Requirement,

@@ -13,13 +13,13 @@ from typer.testing import CliRunner
 
 from agents import LQ, PID, IntegralLineOfSight, WheelOver
 from agents.cli import app
-from agents.deployment.connection import Connection
-from agents.deployment.helm import MANUAL, STEERING
-from agents.deployment.nmea import readings
-from agents.deployment.route import Route
-from agents.deployment.sensors import Limits
-from agents.deployment.simulated import SimulatedShip, simulate_ship
-from agents.deployment.steering import steer
+from agents.export.connection import Connection
+from agents.export.helm import MANUAL, STEERING
+from agents.export.nmea import readings
+from agents.export.route import Route
+from agents.export.sensors import Limits
+from agents.export.simulated import SimulatedShip, simulate_ship
+from agents.export.steering import steer
 from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.errors import InputError
 from shipgym.ships import load_model
@@ -321,7 +321,7 @@ def test_the_command_steers_with_what_it_is_told_and_fails_after_an_alarm(
             state=state, alarm=alarm, counts={"damaged": 2}, ended_by=ended_by
         )
 
-    monkeypatch.setattr("agents.deployment.panel.steer", stand_in)
+    monkeypatch.setattr("agents.export.panel.steer", stand_in)
     PID_MARINER.save(tmp_path / "pid.json")
     WHEEL_OVER.save(tmp_path / "guide.json")
     (tmp_path / "route.csv").write_text(ROUTE)

@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agents import LQ, LQG, PID, TurnRate, WheelOver
-from agents.deployment.autopilot import Autopilot
-from agents.deployment.helm import STEERING, Helm
-from agents.deployment.nmea import NmeaReading
-from agents.deployment.sensors import Limits
-from agents.deployment.simulated import SimulatedShip
+from agents.export.autopilot import Autopilot
+from agents.export.helm import STEERING, Helm
+from agents.export.nmea import NmeaReading
+from agents.export.sensors import Limits
+from agents.export.simulated import SimulatedShip
 from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER
 

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from agents.deployment.c99 import with_prelude
-from agents.deployment.c_structures import kind_of, numbers_of
-from agents.deployment.c_syntax import c_name, literal
-from agents.deployment.translator import Translator
+from agents.export.c99 import with_prelude
+from agents.export.c_structures import kind_of, numbers_of
+from agents.export.c_syntax import c_name, literal
+from agents.export.translator import Translator
 from shipgym.engine import mathematics
 from shipgym.errors import InputError
 from tests.agents.compiling import built

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from identification import identify
-from identification.validation.warnings import model_warnings, why_unstable
+from identification.judging.warnings import model_warnings, why_unstable
 from shipgym import InputError, ShipFile, ShipModel, Trial
 
 DEMO = Path(__file__).parents[2] / "examples" / "mariner"

@@ -8,13 +8,13 @@ import pytest
 from identification import Samples, identify
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.methods import fit_all, get_method
-from identification.uncertainty.bootstrap import (
+from identification.judging.bootstrap import (
     bootstrap_covariance,
     influence_covariance,
     moving_blocks,
     rows_in,
 )
-from identification.uncertainty.covariance import joint_covariance
+from identification.judging.covariance import joint_covariance
 from shipgym import InputError, ShipModel, Trial
 
 

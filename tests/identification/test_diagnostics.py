@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from identification import LSSVM, IdentificationResult, Samples, identify
-from identification.validation.checks import check_trials, is_still
-from identification.validation.diagnostics import (
+from identification.judging.checks import check_trials, is_still
+from identification.judging.diagnostics import (
     autocorrelation,
     diagnose,
     variance_inflation,

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from identification import Options
-from identification.report.turns import turn_sentences
-from identification.simulation_error.prior_knowledge import PriorKnowledge
-from identification.uncertainty.extrapolation import (
+from identification.judging.extrapolation import (
     beyond_trials,
     extrapolation_error,
     growing_error,
     holds_turn,
     largest_rudders,
 )
-from identification.validation.ranking import RankedFit
-from identification.validation.selection import shown_to_turn
+from identification.judging.ranking import RankedFit
+from identification.judging.selection import shown_to_turn
+from identification.models.prior_knowledge import PriorKnowledge
+from identification.report.turns import turn_sentences
 from shipgym import ShipModel, Trial, load_model
 from shipgym.manoeuvres import turning_circle, zigzag
 

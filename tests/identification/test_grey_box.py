@@ -11,17 +11,17 @@ from sklearn.utils.estimator_checks import check_estimator
 
 import shipgym
 from identification import RMSVM, IdentificationResult, identify
+from identification.estimators.pattern_search import pattern_search
 from identification.estimators.rm_svm import heading_error, most_regularised
-from identification.regression.grey_box import chosen_box
-from identification.report.choice_figures import search_figure
-from identification.search.pattern_search import pattern_search
-from identification.simulation_error.similarity import (
+from identification.judging.folds import of_largest_rudder
+from identification.models.similarity import (
     check_alike,
     correlations,
     select_reference,
     similarity_vector,
 )
-from identification.validation.folds import of_largest_rudder
+from identification.report.choice_figures import search_figure
+from identification.samples.grey_box import chosen_box
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag

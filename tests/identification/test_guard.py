@@ -12,14 +12,14 @@ import shipgym
 from identification import IdentificationResult, Samples, identify
 from identification.estimators.estimator import FitTask
 from identification.estimators.methods import fit_held, get_method
-from identification.validation.guard import (
+from identification.judging.guard import (
     Simulation,
     guarded_fit,
     reasons_unstable,
     reversed_rudder,
     why_unphysical,
 )
-from identification.validation.hard_turn import hard_turn_features
+from identification.judging.hard_turn import hard_turn_features
 from shipgym import ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import get_structure

@@ -104,7 +104,7 @@ def test_measured_overshoots_are_those_of_the_data_sheet(
 def test_steering_gear_is_estimated_from_noisy_rudders(
     ship: ShipFile, trials: dict[str, Trial]
 ) -> None:
-    from identification.regression.rudder import estimated_gear
+    from identification.samples.rudder import estimated_gear
 
     assert estimated_gear(list(trials.values())).rudder_rate_deg_s == pytest.approx(
         15.8, rel=0.05

@@ -20,23 +20,23 @@ from identification import (
     TruncatedLSSVM,
     identify,
 )
-from identification.options import Options
-from identification.simulation_error.hull_formulas import (
+from identification.judging.warnings import model_warnings
+from identification.models.hull_formulas import (
     HULL_FORMULAS,
     formula_coefficients,
 )
-from identification.simulation_error.maximum_a_posteriori import (
+from identification.models.maximum_a_posteriori import (
     checked_mmg,
     strongest_as_good,
 )
-from identification.simulation_error.mmg_prior import mmg_prior, reference_coefficients
-from identification.simulation_error.posterior import (
+from identification.models.mmg_prior import mmg_prior, reference_coefficients
+from identification.models.posterior import (
     LARGEST,
     Estimate,
     Posterior,
     held_out_groups,
 )
-from identification.validation.warnings import model_warnings
+from identification.options import Options
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.engine.motion import Motion, Ship
 from shipgym.manoeuvres import turning_circle, turning_indices

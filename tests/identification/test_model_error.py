@@ -11,8 +11,8 @@ from certainty import case
 from identification import IdentificationResult, Samples, Uncertainty, identify
 from identification.estimators.methods import fit_all, get_method
 from identification.estimators.rm_svm import RMSVM
-from identification.regression.grey_box import chosen_box
-from identification.uncertainty.model_error import (
+from identification.judging.closed_loop import closed_loop, legs
+from identification.judging.model_error import (
     DEFAULT,
     PredictionError,
     error_sizes,
@@ -22,9 +22,9 @@ from identification.uncertainty.model_error import (
     scale_of,
     without_trial,
 )
-from identification.validation.closed_loop import closed_loop, legs
-from identification.validation.prediction import predict
-from identification.validation.warnings import held_out_error
+from identification.judging.prediction import predict
+from identification.judging.warnings import held_out_error
+from identification.samples.grey_box import chosen_box
 from shipgym import InputError, ShipModel, Trial, load_model
 from shipgym.manoeuvres import zigzag, zigzag_indices
 from shipgym.ships.simulate import simulate

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from identification import Uncertainty, identify
-from identification.simulation_error.coefficient_prior import CoefficientPrior
-from identification.uncertainty.ensemble import Chains, sample_ensemble
-from identification.uncertainty.mixing import autocorrelation_times, mixing_of
-from identification.uncertainty.posterior import with_posterior
-from identification.uncertainty.quadratic_map import quadratic_map
-from identification.validation.warnings import model_warnings
+from identification.judging.ensemble import Chains, sample_ensemble
+from identification.judging.mixing import autocorrelation_times, mixing_of
+from identification.judging.posterior import with_posterior
+from identification.judging.quadratic_map import quadratic_map
+from identification.judging.warnings import model_warnings
+from identification.models.coefficient_prior import CoefficientPrior
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.trials.sensors import Sensors

@@ -10,7 +10,7 @@ from scipy.signal import savgol_filter
 from scipy.stats import multivariate_normal
 
 from identification import identify
-from identification.regression.preprocess import (
+from identification.samples.preprocess import (
     median,
     noise_level,
     outliers,
@@ -19,14 +19,14 @@ from identification.regression.preprocess import (
     smooth,
     smoothed_channels,
 )
-from identification.regression.preprocess.filters import Reinsch
-from identification.regression.preprocess.kalman import LinearSystem
-from identification.regression.preprocess.kinematics import (
+from identification.samples.preprocess.filters import Reinsch
+from identification.samples.preprocess.kalman import LinearSystem
+from identification.samples.preprocess.kinematics import (
     heading_motion,
     plane_motion,
     smooth_kinematics,
 )
-from identification.regression.preprocess.noise import is_noisy, noise_ratio
+from identification.samples.preprocess.noise import is_noisy, noise_ratio
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 

@@ -12,24 +12,24 @@ import pytest
 import shipgym
 from identification import IdentificationResult, PriorKnowledge, identify
 from identification.estimators.lssvm import TruncatedLSSVM
-from identification.regression.samples import build_samples
-from identification.simulation_error.formulas import (
+from identification.judging.folds import sample_folds
+from identification.models.formulas import (
     clarke_derivatives,
     formula_coefficients,
     kijima_derivatives,
 )
-from identification.simulation_error.prior import (
+from identification.models.prior import (
     Prior,
     reference_prior,
     reference_turns,
     virtual_trials,
 )
-from identification.simulation_error.pulled import (
+from identification.models.pulled import (
     pulled_estimator,
     relative_error,
     strongest_as_good,
 )
-from identification.validation.folds import sample_folds
+from identification.samples.samples import build_samples
 from shipgym import Particulars, ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag

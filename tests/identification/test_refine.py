@@ -11,22 +11,22 @@ import pytest
 from identification import IdentificationResult, Refinement, build_samples, identify
 from identification.estimators.estimator import FitTask
 from identification.estimators.methods import get_method
-from identification.simulation_error.output_error import OutputError, in_bins
-from identification.simulation_error.refine import refine, term_sizes
-from identification.simulation_error.segments import (
+from identification.judging.guard import guarded_fit
+from identification.models.output_error import OutputError, in_bins
+from identification.models.refine import refine, term_sizes
+from identification.models.segments import (
     compared_channels,
     cut,
     segment_edges,
     smoothed_states,
 )
-from identification.simulation_error.shooting import (
+from identification.models.shooting import (
     Shooter,
     about_mean,
     averaged,
     channel_units,
     without_start,
 )
-from identification.validation.guard import guarded_fit
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
 from shipgym.ships.simulate import LONGEST_STEP

@@ -23,6 +23,9 @@ from identification import (
     TruncatedLSSVM,
     identify,
 )
+from identification.estimators.search import BAND, LOG_C, SearchResult
+from identification.judging.diagnostics import cross_correlation
+from identification.judging.warnings import held_out_error
 from identification.report.choice_figures import l_curve_figure, search_figure
 from identification.report.choice_figures import truncated as with_a_rank
 from identification.report.coefficient_figure import coefficients_figure
@@ -43,10 +46,6 @@ from identification.report.tables import (
 )
 from identification.report.view import fit_view, quality_card
 from identification.result import FILES
-from identification.search import SearchResult
-from identification.search.search import BAND, LOG_C
-from identification.validation.diagnostics import cross_correlation
-from identification.validation.warnings import held_out_error
 from shipgym import ShipFile, ShipModel, Trial
 from shipgym.pages import NONE, environment, fixed
 from shipgym.ships.particulars import ADDED_MASSES

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.regression.gear_response import GearResponse, goes_on
-from identification.regression.rudder import estimated_gear, rebuild, straight
+from identification.samples.gear_response import GearResponse, goes_on
+from identification.samples.rudder import estimated_gear, rebuild, straight
 from shipgym import ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
 

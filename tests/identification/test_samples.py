@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from identification import IdentificationResult, Samples, build_samples, identify
-from identification.regression.gaps import between_gaps
-from identification.regression.integrals import (
+from identification.samples.gaps import between_gaps
+from identification.samples.integrals import (
     broken_spline,
     step_integrals,
     twice_integrated,
 )
-from identification.regression.rudder import straight
-from identification.regression.samples import default_window, without_memory
+from identification.samples.rudder import straight
+from identification.samples.samples import default_window, without_memory
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.ships.simulate import open_loop

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from identification import LSSVM, IdentificationResult, Options, identify
-from identification.validation.ranking import RankedFit
-from identification.validation.selection import select, simplest
+from identification.judging.ranking import RankedFit
+from identification.judging.selection import select, simplest
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.ships.linear import straight_running

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.validation.prediction import predict
-from identification.validation.start import with_start
+from identification.judging.prediction import predict
+from identification.judging.start import with_start
 from shipgym import Trial, load_model
 from shipgym.manoeuvres import turning_circle, zigzag
 

@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 
 from identification import Uncertainty, identify
-from identification.regression.current import estimate_current
-from identification.regression.still_water import in_still_water
-from identification.regression.surge_sway import (
+from identification.report.sea import current_text, sea_sentences, track_figure
+from identification.samples.current import estimate_current
+from identification.samples.still_water import in_still_water
+from identification.samples.surge_sway import (
     MEAN,
     Coefficients,
     SurgeSwayInputs,
     accelerations,
 )
-from identification.regression.trial_currents import currents_of, wald_probability
-from identification.regression.velocities import through_water
-from identification.regression.wind import measured_wind
-from identification.report.sea import current_text, sea_sentences, track_figure
+from identification.samples.trial_currents import currents_of, wald_probability
+from identification.samples.velocities import through_water
+from identification.samples.wind import measured_wind
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, zigzag

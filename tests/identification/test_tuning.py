@@ -17,11 +17,15 @@ from identification import (
     TunedLSSVM,
     minimise,
 )
-from identification.search import get_optimiser
-from identification.search.objectives import held_out_error, time_blocks, training_error
-from identification.search.optimisers import Colony
-from identification.search.pattern_search import pattern_search
-from identification.search.search import Optimiser, Recorder
+from identification.estimators.by_name import get_optimiser
+from identification.estimators.objectives import (
+    held_out_error,
+    time_blocks,
+    training_error,
+)
+from identification.estimators.optimisers import Colony
+from identification.estimators.pattern_search import pattern_search
+from identification.estimators.search import Optimiser, Recorder
 from shipgym import InputError
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]

@@ -7,7 +7,7 @@ import pytest
 
 from identification import Samples, build_samples
 from identification.estimators.methods import fit_all, get_method
-from identification.uncertainty.covariance import (
+from identification.judging.covariance import (
     coefficient_covariance,
     effective_freedom,
     joint_covariance,

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from identification import IdentificationResult
-from identification.validation.prediction import trial_metrics
-from identification.validation.warnings import (
+from identification.judging.prediction import trial_metrics
+from identification.judging.warnings import (
     exactly_collinear,
     held_out_error,
     model_warnings,

@@ -14,7 +14,7 @@ from __future__ import annotations
 from math import fabs, pi, sqrt
 from typing import Any
 
-from identification.simulation_error.formulas import clarke_derivatives
+from identification.models.formulas import clarke_derivatives
 from shipgym.engine.mathematics import small_sin_cos
 from shipgym.engine.motion import Motion, Ship
 from shipgym.ships.equations import ShipEquations, record_of

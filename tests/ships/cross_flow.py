@@ -21,7 +21,7 @@ from dataclasses import replace
 from math import fabs, pi, sqrt
 from typing import Any
 
-from identification.simulation_error.formulas import clarke_derivatives
+from identification.models.formulas import clarke_derivatives
 from shipgym import ShipModel
 from shipgym.engine.mathematics import arctan2, sin_cos
 from shipgym.engine.motion import Motion, Ship

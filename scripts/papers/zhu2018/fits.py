@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.tuned import TunedLSSVM
-from identification.regression.samples import Samples, build_samples
+from identification.samples.samples import Samples, build_samples
 from shipgym.ships import ShipModel, get_structure
 from shipgym.ships.structures import own_structure
 from shipgym.trials.trial import Trial

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.recursive import RecursiveLeastSquares
+from identification.judging.prediction import predict
 from identification.pipeline import identify
-from identification.regression.samples import build_samples
-from identification.validation.prediction import predict
+from identification.samples.samples import build_samples
 from papers.row import ELSEWHERE, Row
 from papers.zhu2018.fits import every
 from shipgym.manoeuvres import zigzag

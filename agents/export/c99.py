@@ -1,0 +1,157 @@
+"""C99, XML and sentences of NMEA 0183, made from templates."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+import shipgym
+from agents.export.c_structures import Parameter
+from agents.export.c_syntax import KEYWORDS, comment, literal
+from agents.export.variables import Variables
+from shipgym import InputError
+from shipgym.trials.units import UNITS
+
+
+@dataclass(frozen=True)
+class Source:
+    """A header and a source file by a name, and what a wrapper needs to know of them.
+
+    Attributes
+    ----------
+    step : float
+        s, of an autopilot its control interval, of a ship the longest advised step.
+    title : str
+        What was exported, in the user's own letters.
+    sha256 : str
+        Hash of the model's numbers.
+    parameters : tuple of Parameter
+        Numbers that may be set while it runs.
+    tables : tuple of str
+        Paths of the tables among the parameters.
+    notes : tuple of str
+        What was left out, and why.
+    """
+
+    name: str
+    header: str
+    source: str
+    inputs: Variables
+    outputs: Variables
+    step: float
+    ship: bool
+    title: str
+    sha256: str
+    parameters: tuple[Parameter, ...] = ()
+    tables: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def checked_name(name: str) -> str:
+    """A name as C takes it, other characters replaced by underscores.
+
+    Raises InputError for one that begins with no letter, is a word of C, or is too
+    long.
+    """
+    allowed = re.sub(r"\W", "_", name, flags=re.ASCII)
+    starts_with_letter = re.match("[A-Za-z]", allowed)
+    # characters, so that what is made of it stays within the 63 of C99
+    longest_name = 31
+    if not starts_with_letter or allowed in KEYWORDS or len(allowed) > longest_name:
+        raise InputError(
+            f"name: expected at most {longest_name} letters, digits and underscores, a"
+            f" letter first, and no word of C, got {name[:60]!r}; give another with"
+            " --name"
+        )
+    return allowed
+
+
+def render(template: str, name: str = "", **data: Any) -> str:
+    """A text made from one of the templates."""
+    return (
+        _environment()
+        .get_template(template)
+        .render(
+            **data,
+            name=name,
+            NAME=name.upper(),
+            version=shipgym.__version__,
+        )
+    )
+
+
+def c_source(template: str, name: str, real: str = "double", **data: Any) -> str:
+    """Source in C made from a template, after the functions that it calls."""
+    body = render(template, name, real=real, **data)
+    return with_prelude(name, body, real)
+
+
+def with_prelude(name: str, body: str, real: str = "double") -> str:
+    """Text of a source after the header and the functions of the prelude it calls."""
+    return render("prelude.c.j2", name, real=real, body=body)
+
+
+def hash_text(sha256: str) -> str:
+    """A hash as it may stand in a string of C; another text is no hash."""
+    is_hash = re.fullmatch("[0-9a-f]{64}", sha256)
+    return sha256 if is_hash else "unknown"
+
+
+def _calls(text: str, function: str) -> bool:
+    """True if a text of C calls a function."""
+    return re.search(rf"\b{function}\(", text) is not None
+
+
+def single(number: float) -> str:
+    """A number in single precision as C writes it."""
+    return f"{number:.9e}f"
+
+
+def degrees(angle: float) -> float:
+    """An angle, rad, in degrees with four decimals."""
+    return round(float(np.degrees(angle)), 4)
+
+
+def knots(speed: float) -> float:
+    """A speed, m/s, in knots with four decimals."""
+    return round(speed / UNITS["speed"]["kn"], 4)
+
+
+def heading(angle: float) -> float:
+    """An angle, rad, in degrees from 0 to below 360 with four decimals."""
+    return round(float(np.degrees(angle)) % 360.0, 4) % 360.0
+
+
+def array(numbers: Iterable[Any]) -> str:
+    """Numbers of an array in single precision as C initialises it."""
+    entries = []
+    for entry in numbers:
+        is_number = np.ndim(entry) == 0
+        text = single(entry) if is_number else array(entry)
+        entries.append(text)
+    inside = ", ".join(entries)
+    return f"{{{inside}}}"
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("agents.export"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters |= {
+        "c": literal,
+        "comment": comment,
+        "floats": array,
+        "deg": degrees,
+        "knots": knots,
+        "heading": heading,
+    }
+    environment.tests["calling"] = _calls
+    return environment

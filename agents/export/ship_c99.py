@@ -1,0 +1,239 @@
+"""Ship models as C99, translated from the functions that the environments compile."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from agents.controllers.interface import model_hash
+from agents.export.c99 import Source, c_source, checked_name, render
+from agents.export.c_structures import (
+    Parameter,
+    leaf_paths,
+    parameters_of,
+    record_kind,
+)
+from agents.export.c_syntax import comment
+from agents.export.term_labels import coefficient_labels
+from agents.export.translator import Translator
+from agents.export.variables import SHIP_INPUTS, SHIP_STATES, Variables
+from shipgym import InputError, ShipModel, Weather, Wind
+from shipgym.arrays import Floats
+from shipgym.engine.mathematics import sin_cos
+from shipgym.engine.motion import Motion, Push, Ship, lost, sail
+from shipgym.engine.records import flat, leaves
+from shipgym.sea.open_sea import Sea, SeaParameters, push, sea_functions
+from shipgym.sea.weather_column import CALM, weather_column
+from shipgym.ships.simulate import LONGEST_STEP
+
+
+class ShipInput(NamedTuple):
+    """Input of a ship, held over a step (`SHIP_INPUTS`)."""
+
+    rudder: float
+    shaft: float
+    current_north: float
+    current_east: float
+    wind_speed: float
+    wind_from: float
+
+
+def advance(
+    motion: Motion, given: ShipInput, h: float, c: Any, ship: Ship, p: SeaParameters
+) -> Motion:
+    """State after a step in a steady current and wind, as `simulate` sails it."""
+    north = given.current_north
+    east = given.current_east
+    pushed = Push(u=0.0, v=0.0, r=0.0, p=0.0, north=north, east=east)
+    if given.wind_speed > 0.0:
+        pushed = push(motion, steady_sea(given), p)
+    return sail(motion, given.rudder, given.shaft, h, pushed, c, ship)
+
+
+def steady_sea(given: ShipInput) -> Sea:
+    """Sea of a steady current and wind, without waves or gusts."""
+    sine, cosine = sin_cos(given.wind_from)
+    return Sea(
+        mean_north=0.0,
+        mean_east=0.0,
+        wind_north=cosine,
+        wind_east=sine,
+        waves_north=1.0,
+        waves_east=0.0,
+        current_north=given.current_north,
+        current_east=given.current_east,
+        gust=given.wind_speed,
+        drift=0.0,
+        heading_displacement=0.0,
+        heading_velocity=0.0,
+        roll_displacement=0.0,
+        roll_velocity=0.0,
+        psi_wave=0.0,
+        r_wave=0.0,
+        phi_wave=0.0,
+        p_wave=0.0,
+    )
+
+
+def ship_source(
+    model: ShipModel,
+    name: str | None = None,
+    water_depth: float = np.inf,
+    real: str = "double",
+) -> Source:
+    """Write a ship model as C99, by default under the model's name.
+
+    `water_depth`: m; `real`: type of her numbers, double or float. A ship with too few
+    particulars for wind forces is written without them, as `Source.notes` says. Raises
+    InputError for a name that C does not take, shallow water that the model does not
+    know, and equations of one's own that use more than arithmetic.
+    """
+    name = checked_name(name or model.name)
+    longest = LONGEST_STEP * model.travel_time
+    weather, note = _weather(model, water_depth)
+    numbers = [*model.ship_numbers(water_depth, longest), *weather]
+    inputs = _inputs(model, windy=not note)
+    outputs = _outputs(model)
+    c = Translator({**model.compiled.hooks(), **sea_functions(True)}, name, real)
+    c.structures.labels |= coefficient_labels(model)
+    kind = record_kind(
+        "Parameters",
+        {
+            "ship": Ship,
+            "coefficients": model.compiled.coefficients,
+            "sea": SeaParameters,
+        },
+    )
+    title = f"Ship model '{model.name}'"
+    data = {
+        "title": comment(title),
+        "sha256": model_hash(model),
+        "inputs": inputs,
+        "outputs": outputs,
+        "all_inputs": SHIP_INPUTS,
+        "all_states": SHIP_STATES,
+        "step": longest,
+        "speed": model.particulars["speed"],
+        "shaft": _start(model)["shaft"],
+        "limit": model.steering.limit,
+        **_translated(c, model, kind, numbers),
+    }
+    return Source(
+        name=name,
+        header=render("ship.h.j2", name, real=real, **data),
+        source=c_source("ship.c.j2", name, real, **data),
+        inputs=inputs,
+        outputs=outputs,
+        step=longest,
+        ship=True,
+        title=title,
+        sha256=model_hash(model),
+        parameters=_tunable(c, model, kind, numbers),
+        tables=tuple(leaf_paths(kind, tables=True)),
+        notes=(note,) if note else (),
+    )
+
+
+def _tunable(
+    c: Translator, model: ShipModel, kind: Any, numbers: Sequence[float]
+) -> tuple[Parameter, ...]:
+    """Parameters of her steering gear and her coefficients."""
+    gear = {"ship.rudder_limit", "ship.rudder_rate"}
+    if model.compiled.lag:
+        gear.add("ship.gear_frequency")
+
+    kept = []
+    for parameter in parameters_of(c.structures, kind, iter(numbers)):
+        path = parameter.path
+        of_hull = path.startswith("coefficients.")
+        has_effect = of_hull or path in gear
+        # XML has no word for an infinite number
+        if has_effect and np.isfinite(parameter.value):
+            kept.append(parameter)
+    return tuple(kept)
+
+
+def _translated(
+    c: Translator, model: ShipModel, kind: Any, numbers: Sequence[float]
+) -> dict[str, Any]:
+    """Functions and structures of a ship in C, for the templates.
+
+    `numbers`: those of the ship, her coefficients and her sea, in order.
+    """
+    structures = c.structures
+    prefix = structures.prefix
+    structures.types |= {Motion: f"{prefix}_state", ShipInput: f"{prefix}_input"}
+    structures.declare(kind, f"{prefix}_parameters")
+    header, structures.texts = structures.texts, []
+    parameters = structures.initialiser(kind, iter(numbers))
+
+    coefficients = model.compiled.coefficients
+    step = c.function(
+        advance,
+        Motion,
+        ShipInput,
+        float,
+        coefficients,
+        Ship,
+        SeaParameters,
+    )
+    has_lost = c.function(lost, Motion, Ship)
+
+    start = _start(model)
+    at_start = [start.get(state, 0.0) for state in Motion._fields]
+    return {
+        "begin": structures.initialiser(Motion, iter(at_start)),
+        "parameters": parameters,
+        "parameter_structures": header,
+        "state_paths": leaf_paths(Motion),
+        "structures": structures.texts,
+        "functions": c.functions,
+        "advance": step.name,
+        "lost": has_lost.name,
+    }
+
+
+def _weather(model: ShipModel, water_depth: float) -> tuple[Floats, str]:
+    """Numbers of a weather whose wind comes later, and a note if it has no wind."""
+    wind = Wind(1.0, 0.0, gust=False)
+    weather = Weather(wind=wind)
+    note = ""
+    try:
+        column = weather_column(model, weather, 1.0, water_depth)
+    except InputError as error:
+        note = f"wind is left out: {error}"
+        column = np.array(flat(CALM))
+    wind_speed = leaves(SeaParameters).index("wind_speed")
+    column[wind_speed] = 0.0
+    return column, note
+
+
+def _start(model: ShipModel) -> dict[str, float]:
+    """States and orders straight ahead at service speed, by name."""
+    states = zip(model.state_names, model.service_state.tolist(), strict=True)
+    shaft = float(model.service_shaft_speed)
+    return {"n": shaft, "shaft": shaft, **dict(states)}
+
+
+def _inputs(model: ShipModel, windy: bool) -> Variables:
+    """Inputs that have an effect on a ship, with their values at the beginning."""
+    without = set() if windy else {"wind_speed", "wind_from"}
+    if "n" not in model.command_names:
+        without.add("shaft")
+    return _started(model, SHIP_INPUTS.keys() - without, SHIP_INPUTS)
+
+
+def _outputs(model: ShipModel) -> Variables:
+    """States that a ship has or is ordered, with their values at the beginning."""
+    return _started(model, {*model.state_names, *model.command_names}, SHIP_STATES)
+
+
+def _started(model: ShipModel, names: set[str], variables: Variables) -> Variables:
+    """Variables of these names, with their values at the beginning."""
+    start = _start(model)
+    started = {}
+    for name, variable in variables.items():
+        if name in names:
+            value = start.get(name, 0.0)
+            started[name] = variable._replace(start=value)
+    return started

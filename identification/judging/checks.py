@@ -1,0 +1,120 @@
+"""Refusals of trials that cannot identify a structure: channels, samples, motion."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from identification.samples import preprocess
+from identification.samples.samples import Samples
+from shipgym import InputError, Trial
+from shipgym.ships import Structure
+
+
+def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
+    """Refuse trials from which a structure cannot be identified.
+
+    There are none, one lacks a channel or has times that nearly coincide, or no rudder
+    ever moves.
+    """
+    if structure.captive:
+        raise InputError(
+            "structure: expected one for free-running trials, got"
+            f" '{structure.name}', which is identified from captive tests with the"
+            " channels X, Y, N; use identification.identify_forces"
+        )
+    if not trials:
+        raise InputError(
+            'trials: expected at least one that is marked use = "fit", got none; mark'
+            " the trials to identify from"
+        )
+    for trial in trials:
+        _check_channels(trial, structure)
+        _check_steps(trial)
+    if structure.has_rudder and all(is_still(trial) for trial in trials):
+        _refuse_still(trials[0])
+
+
+def _check_channels(trial: Trial, structure: Structure) -> None:
+    needed = structure.required_channels
+    for channel in needed:
+        if channel in trial:
+            continue
+        hint = ""
+        if channel == "u":
+            hint = "; nomoto, norrbin and nomoto2 take the speed of [ship]"
+        raise InputError(
+            f"trial {trial.name!r}: channel {channel!r} is missing, structure"
+            f" {structure.name!r} needs {', '.join(needed)}; name its column, or"
+            f' leave the trial out (use = "skip"){hint}'
+        )
+
+
+def _check_steps(trial: Trial) -> None:
+    """Refuse a row that was written twice: a step of less than 1e-4 of the usual."""
+    steps = np.diff(trial.t)
+    usual = float(np.median(steps))
+    row = int(np.argmin(steps))
+    shortest = steps[row]
+    if shortest < 1e-4 * usual:
+        begin = trial.t[row]
+        end = trial.t[row + 1]
+        raise InputError(
+            f"trial {trial.name!r}: expected samples about {usual:.3g} s apart, got"
+            f" {shortest:.2g} s from {begin:.12g} to {end:.12g} s;"
+            " remove the repeated row"
+        )
+
+
+def is_still(trial: Trial) -> bool:
+    """Tell whether a rudder does nothing but scatter.
+
+    Its running median over five samples, in which shorter excursions are outliers,
+    moves by less than half a degree, or six times the noise up to 3 degrees.
+    """
+    delta = trial["delta"]
+    width = min(5, len(delta))
+    windows = sliding_window_view(delta, width)
+    medians = np.median(windows, axis=1)
+    moved = np.ptp(medians)
+
+    noise = preprocess.noise_level(trial.t, delta)
+    most_scatter = np.radians(3.0)
+    scatter = min(6.0 * noise, most_scatter)
+    least_move = np.radians(0.5)
+    return bool(moved < max(least_move, scatter))
+
+
+def _refuse_still(trial: Trial) -> None:
+    angle = np.degrees(np.median(trial["delta"]))
+    raise InputError(
+        f"trial {trial.name!r}: expected a rudder that moves, got one that stays at"
+        f" {angle:.2f} deg throughout; nothing is excited and these coefficients cannot"
+        " be identified: add a trial in which the rudder moves, such as a zigzag"
+    )
+
+
+def check_samples(
+    samples: Samples, trials: Sequence[Trial], structure: Structure
+) -> None:
+    """Refuse too few rows for the terms, and a motion that never changes."""
+    motions = {"u": "surge speed", "v": "sway speed", "r": "yaw rate", "p": "roll rate"}
+    for q, change in samples.targets.items():
+        if not np.any(change):
+            motion = motions.get(q, q)
+            first = trials[0].name
+            n_trials = len(trials)
+            raise InputError(
+                f"trial {first!r}: expected the {motion} to be"
+                f" excited and measured, got a channel {q!r} that never changes, in"
+                f" none of the {n_trials} trials to fit; leave the column out if it"
+                " was not measured, or choose a structure without that equation"
+            )
+    terms = max(len(structure.regression_names(q)) for q in structure.regressed)
+    if len(samples) <= terms:
+        shortest = min(trials, key=len)
+        raise InputError(
+            f"trial {shortest.name!r}: expected several times as many samples as the"
+            f" {terms} coefficients of an equation, got {len(shortest)}, in all"
+            f" {len(samples)} rows; add trials, longer or sampled more often"
+        )

@@ -1,0 +1,138 @@
+"""Covariance of the coefficients of all equations of motion together."""
+
+import numpy as np
+
+from identification.estimators.estimator import Estimator, Estimators, weights
+from identification.estimators.threads import single_threaded
+from identification.samples.samples import Samples
+from shipgym.arrays import Floats
+from shipgym.trials.resampling import usual_step
+
+
+def residuals(estimators: Estimators, samples: Samples) -> dict[str, Floats]:
+    """Target less prediction of each equation, arrays of shape (n_rows,)."""
+    errors = {}
+    for q, estimator in estimators.items():
+        predicted = estimator.predict(samples.features[q])
+        errors[q] = samples.targets[q] - predicted
+    return errors
+
+
+@single_threaded()
+def joint_covariance(
+    estimators: Estimators,
+    samples: Samples,
+    memory: float = 0.0,
+) -> Floats:
+    """Covariance of the coefficients of all equations.
+
+    With the coefficients of each equation a linear map of its targets, the covariance
+    follows from that of the residuals. Without memory they are independent in time
+    (classical formula, with the covariance of the residuals between equations); with
+    memory it is estimated as by Newey & West 1987 (Econometrica 55(3)) with Bartlett's
+    weights, each trial by itself. Exact features are assumed. Of an estimator that
+    weights its samples it is the residuals times their weights that count (Huber's
+    sandwich). `estimators`: fitted to `samples` without intercept, by equation;
+    `samples`: the regression; `memory`: time over which residuals are taken to be
+    correlated, s. Returns the covariance in the order of the equations and their
+    features, shape (n_coefficients, n_coefficients).
+    """
+    maps, errors = [], []
+    unweighted = residuals(estimators, samples)
+    for q, estimator in estimators.items():
+        X = samples.features[q]
+        counts = weights(estimator, X)
+        # scaled to the variance of errors, of which fitting takes a part
+        freedom = effective_freedom(estimator, X)
+        scale = np.sqrt(len(samples) / freedom)
+        weighted = unweighted[q] * counts
+        errors.append(weighted * scale)
+        maps.append(X @ estimator.inverse_moment_)
+    if memory <= 0.0:
+        return _without_memory(maps, errors)
+    return _with_memory(maps, errors, samples, memory)
+
+
+def _without_memory(maps: list[Floats], errors: list[Floats]) -> Floats:
+    """Covariance for errors that are independent in time."""
+    rows = []
+    for own_map, own_errors in zip(maps, errors, strict=True):
+        blocks = []
+        for other_map, other_errors in zip(maps, errors, strict=True):
+            n_rows = len(own_errors)
+            moment = (own_errors @ other_errors) / n_rows
+            block = moment * (own_map.T @ other_map)
+            blocks.append(block)
+        rows.append(blocks)
+    return np.block(rows)
+
+
+def _with_memory(
+    maps: list[Floats],
+    errors: list[Floats],
+    samples: Samples,
+    memory: float,
+) -> Floats:
+    """Covariance for errors that last, each trial by itself."""
+    by_equation = []
+    for own_map, own_errors in zip(maps, errors, strict=True):
+        moved = own_map * own_errors[:, None]
+        by_equation.append(moved)
+    scores = np.hstack(by_equation)
+
+    n_coefficients = scores.shape[1]
+    total = np.zeros((n_coefficients, n_coefficients))
+    for trial in np.unique(samples.trial):
+        own = samples.trial == trial
+        lags = _lags(memory, samples.start[own])
+        total += newey_west(scores[own], lags)
+    return 0.5 * (total + total.T)
+
+
+def _lags(memory: float, start: Floats) -> int:
+    """Rows over which errors of rows that start at some times are correlated."""
+    if len(start) < 2:
+        return 1
+    spacing = usual_step(start)
+    return round(memory / spacing)
+
+
+def effective_freedom(estimator: Estimator, features: Floats) -> float:
+    """Samples less effective number of parameters, at least 1."""
+    counts = weights(estimator, features)
+    weighted = features * counts[:, None]
+    moment = features.T @ weighted
+    hat = estimator.inverse_moment_ @ moment
+
+    n_samples = len(features)
+    n_parameters = float(np.trace(hat))
+    return max(n_samples - n_parameters, 1.0)
+
+
+def coefficient_covariance(
+    acceleration_covariance: Floats, acceleration_matrix: Floats
+) -> Floats:
+    """Covariance of the hydrodynamic derivatives from that of the accelerations.
+
+    Of the coefficients of these, that is. Both have the shape (n, n), as the matrix,
+    which maps derivatives to those coefficients (`Structure.acceleration_matrix`).
+    """
+    half = np.linalg.solve(acceleration_matrix, acceleration_covariance)
+    covariance: Floats = np.linalg.solve(acceleration_matrix, half.T)
+    return 0.5 * (covariance + covariance.T)
+
+
+def newey_west(scores: Floats, lags: int) -> Floats:
+    """Long-run second moment of the rows of scores, shape (n_columns, n_columns).
+
+    By Newey & West 1987, with Bartlett's weights 1 - lag / (lags + 1).
+    """
+    most = min(lags, len(scores) - 1)
+    total: Floats = scores.T @ scores
+    for lag in range(1, most + 1):
+        later = scores[lag:]
+        earlier = scores[:-lag]
+        moment = later.T @ earlier
+        weight = 1.0 - lag / (most + 1.0)
+        total += weight * (moment + moment.T)
+    return total

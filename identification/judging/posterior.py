@@ -1,0 +1,276 @@
+"""Posterior of the coefficients by sampling, draws of which the model keeps."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from identification.arrays import by_name
+from identification.judging.coarsened import CoarsenedPosterior
+from identification.judging.ensemble import Chains, LogDensity, sample_ensemble
+from identification.judging.mixing import Mixing, mixing_of
+from identification.judging.model_error import FEWEST_TRIALS, model_error
+from identification.judging.uncertainty import Uncertainty
+from identification.models.coefficient_prior import CoefficientPrior
+from identification.models.whole_trials import WholeTrials
+from shipgym import InputError, ShipModel, Trial
+from shipgym.arrays import Floats
+from shipgym.manoeuvres.execution import usual_rudder
+
+
+def check_trials(trials: Sequence[Trial]) -> None:
+    """Refuse trials too few or too alike to tell how much their likelihood counts."""
+    n_trials = len(trials)
+    if n_trials < FEWEST_TRIALS:
+        raise InputError(
+            f"uncertainty: expected at least {FEWEST_TRIALS} trials to fit for a"
+            " posterior, whose likelihood counts by how trials left out in turn are"
+            f" predicted, got {n_trials}; add trials, or choose 'analytic'"
+        )
+    first = trials[0]
+    if all(_alike(first, trial) for trial in trials[1:]):
+        angle = np.degrees(usual_rudder(first))
+        raise InputError(
+            "uncertainty: expected trials that differ in kind, rudder angle or side for"
+            f" a posterior, got {n_trials} alike ({first.kind or 'trials'} with"
+            f" {angle:.0f} deg to the same side first), of which one left out tells"
+            " nothing; add another trial, or choose 'analytic'"
+        )
+
+
+def _alike(one: Trial, other: Trial) -> bool:
+    """Whether two trials are the same manoeuvre to a degree and begin to one side."""
+    angles = np.degrees([usual_rudder(one), usual_rudder(other)])
+    same_angle = abs(angles[0] - angles[1]) <= 1.0
+    same_side = _first_side(one) == _first_side(other)
+    return bool(one.kind == other.kind and same_angle and same_side)
+
+
+def _first_side(trial: Trial) -> float:
+    """Sign of the first rudder angle that is half the usual one."""
+    delta = trial["delta"]
+    large = np.abs(delta) >= 0.5 * usual_rudder(trial)
+    return float(np.sign(delta[large.argmax()]))
+
+
+def table_prior(model: ShipModel) -> CoefficientPrior:
+    """Weak prior of a table: its estimate, three times as uncertain as estimated.
+
+    Directions that the estimate leaves no uncertainty, such as those that a truncation
+    dropped, stay as they are.
+    """
+    widening = 3.0
+    mean = np.array(list(model.coefficients.values()))
+    covariance = np.asarray(model.covariance)
+    deviations = np.sqrt(np.diag(covariance))
+    units = np.where(deviations > 0.0, deviations, 1.0)
+    correlations = covariance / np.outer(units, units)
+    values, vectors = np.linalg.eigh(correlations)
+    kept = values > 1e-9 * values.max()
+    root = units[:, None] * vectors[:, kept] * np.sqrt(values[kept])
+    source = f"{widening:g} times the standard errors about the least-squares estimate"
+    return CoefficientPrior(source, mean, widening * root)
+
+
+def with_posterior(
+    model: ShipModel,
+    trials: Sequence[Trial],
+    prior: CoefficientPrior,
+    asked: Uncertainty,
+) -> tuple[ShipModel, dict[str, Any]]:
+    """The model with draws of its posterior, and a report for the provenance.
+
+    `model`, with the covariance that it keeps where the walkers do not mix, was
+    identified from `trials`. Raises InputError for trials too few or too alike.
+    """
+    check_trials(trials)
+    bare = replace(model, covariance=None, draws=None)
+    whole = WholeTrials(bare, trials, prior)
+    start = _point_of(model, prior)
+    scales = whole.scales(start)
+    if not np.isfinite(scales).all():
+        remark = (
+            "posterior: not sampled, the model runs away in a trial; covariance kept"
+        )
+        return model, {"kept": False, "remarks": [remark]}
+
+    by_scatter = CoarsenedPosterior(whole, scales, power=1.0)
+    mode = by_scatter.mode(start)
+    remarks = contradictions(whole, mode.point)
+    by_scatter = replace(by_scatter, scales=whole.scales(mode.point))
+    posterior, error = coarsened(by_scatter, trials, start)
+
+    chains = _chains(posterior, start, asked)
+    mixing = mixing_of(chains)
+    if not mixing.is_enough:
+        remarks.append(_not_mixed(mixing))
+    else:
+        model = _with_draws(model, prior, chains.flat, asked.seed)
+    return model, {
+        "kept": mixing.is_enough,
+        "prior": prior.source,
+        "power": posterior.power,
+        "left_out": error,
+        "parameters": prior.n_parameters,
+        **mixing.plain(),
+        "error_scales": by_name(whole.channels, posterior.scales),
+        "remarks": remarks,
+    }
+
+
+def _point_of(model: ShipModel, prior: CoefficientPrior) -> Floats:
+    """The point of a model's coefficients."""
+    values = np.array(list(model.coefficients.values()))
+    units = prior.deviations
+    known = units > 0.0
+    scaled_root = prior.root[known] / units[known, None]
+    off = (values - prior.mean)[known] / units[known]
+    point, *_ = np.linalg.lstsq(scaled_root, off, rcond=1e-12)
+    return np.asarray(point)
+
+
+def coarsened(
+    posterior: CoarsenedPosterior, trials: Sequence[Trial], start: Floats
+) -> tuple[CoarsenedPosterior, dict[str, Any]]:
+    """The posterior of the power at which trials left out have errors of size one.
+
+    Errors are those of `model_error`, of modes and their Gauss-Newton covariances. Its
+    last report is returned too.
+    """
+    of_parts = posterior.trials.of_trials
+    error: dict[str, Any] = {}
+    slope = 0.5  # of the factor by the power, logarithms: of normal distributions
+    earlier: tuple[float, float] | None = None
+    for _ in range(3):
+        own = posterior.mode(start)
+        left_out = []
+        for trial in range(len(trials)):
+            mode = posterior.mode(own.point, kept=of_parts != trial)
+            left_out.append(posterior.model(mode))
+        error = model_error(posterior.model(own), left_out, trials)
+        factor: float = error["factor"]
+        near_enough = 1.1
+        if factor <= near_enough:
+            break
+        logs = float(np.log(posterior.power)), float(np.log(factor))
+        if earlier is not None:
+            by_secant = (logs[1] - earlier[1]) / (logs[0] - earlier[0])
+            slope = min(max(by_secant, 0.1), 0.5)
+        earlier = logs
+        posterior = replace(posterior, power=float(np.exp(logs[0] - logs[1] / slope)))
+    return posterior, error
+
+
+def _chains(posterior: CoarsenedPosterior, start: Floats, asked: Uncertainty) -> Chains:
+    """Points of the posterior that walkers went through."""
+    shape = posterior.map(posterior.mode(start))
+
+    def log_density(coordinates: Floats) -> Floats:
+        return posterior.log_density(shape.points(coordinates))
+
+    rng = np.random.default_rng(asked.seed)
+    chains = sample_ensemble(
+        log_density,
+        _walkers(log_density, len(start), rng),
+        steps=asked.steps,
+        warm_up=asked.steps // 2,
+        seed=asked.seed,
+    )
+    points = shape.points(chains.flat)
+    return replace(chains, points=points.reshape(chains.points.shape))
+
+
+def _with_draws(
+    model: ShipModel, prior: CoefficientPrior, points: Floats, seed: int
+) -> ShipModel:
+    """The model with the covariance of points of the posterior, and some of them."""
+    n_draws = 256
+    rng = np.random.default_rng(seed)
+    chosen = rng.choice(len(points), n_draws, replace=False)
+    chosen.sort()
+    of_points = np.atleast_2d(np.cov(points.T))
+    return replace(
+        model,
+        covariance=prior.covariance(of_points),
+        draws=_rounded(prior.coefficients(points[chosen])),
+    )
+
+
+def _walkers(
+    log_density: LogDensity, n_parameters: int, rng: np.random.Generator
+) -> Floats:
+    """Walkers of a density that is nearly standard normal.
+
+    They are chosen among five times as many normal points by what these weigh in the
+    density (sampling importance resampling, Rubin 1988).
+    """
+    whole_batches = 128
+    fewest = 2 * n_parameters
+    batches = math.ceil(fewest / whole_batches)
+    n_walkers = whole_batches * batches
+    n_points = 5 * n_walkers
+    points = rng.standard_normal((n_points, n_parameters))
+    points[0] = 0.0  # the mode
+
+    squares = np.sum(points**2, axis=1)
+    log_weights = log_density(points) + 0.5 * squares
+    # the largest of log weights and Gumbel numbers are a draw without replacement
+    chances = rng.gumbel(size=n_points)
+    order = np.argsort(log_weights + chances)
+    best = order[-n_walkers:]
+    chosen = points[best]
+    values = log_density(chosen)
+    finite = np.isfinite(values)
+    chosen[~finite] *= 0.01
+    return np.asarray(chosen)
+
+
+def contradictions(whole: WholeTrials, point: Floats) -> list[str]:
+    """A remark where the trials contradict the prior, on what is farthest off.
+
+    `point` is the most probable one by the scatter of the errors alone: where the
+    likelihood counts for less, a narrow prior would hide that it is wrong.
+    """
+    prior = whole.prior
+    deviations = prior.deviations
+    known = deviations > 0.0
+    values = prior.coefficients(point[None])[0]
+    off = np.zeros(len(values))
+    off[known] = (values - prior.mean)[known] / deviations[known]
+    worst = int(np.abs(off).argmax())
+    limit = 3.0
+    if abs(off[worst]) <= limit:
+        return []
+    name = list(whole.blank.coefficients)[worst]
+    return [
+        f"prior: expected coefficients within {limit:g} standard deviations of the"
+        f" prior ({prior.source}), got {name} {off[worst]:+.1f} from its mean by the"
+        " trials; check the particulars, or choose another prior"
+    ]
+
+
+def _not_mixed(mixing: Mixing) -> str:
+    """A remark on walkers that did not mix."""
+    fewest = mixing.fewest_times
+    steps = mixing.steps
+    time = mixing.autocorrelation_time
+    needed = 2.0 * fewest * time
+    hundreds = math.ceil(needed / 100.0)
+    more = max(100 * hundreds, 2 * steps)
+    wanted = (
+        f"{fewest:g} autocorrelation times and a split R-hat up to"
+        f" {mixing.largest_r_hat:g}"
+    )
+    found = f"{steps} steps of {time:.0f} each and {mixing.r_hat:.2f}"
+    return (
+        f"posterior: expected walkers that mix, {wanted}, got {found}; the covariance"
+        f" is kept: try uncertainty.steps = {more}"
+    )
+
+
+def _rounded(values: Floats) -> Floats:
+    """Values to eight significant digits, for a small file."""
+    written = [float(f"{value:.8g}") for value in values.ravel()]
+    return np.array(written).reshape(values.shape)

@@ -1,0 +1,110 @@
+"""Predictions of recorded trials, open loop from the measured rudder, and errors."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from identification.arrays import root_mean_square
+from identification.judging.closed_loop import closed_loop
+from identification.judging.predicted import COMPARED, predicted_channels
+from identification.judging.start import with_start
+from shipgym import InputError, ShipModel, Trial, UnstableModelError
+from shipgym.manoeuvres import switch_heading_deg, turning_indices, zigzag_indices
+from shipgym.ships.simulate import open_loop
+
+ZIGZAG = ("overshoot_1_deg", "overshoot_2_deg")
+
+#: From a run of a trial's manoeuvre, or None for one that ran away, to its indices.
+IndexReader = Callable[[Trial | None], Any]
+
+
+def predict(model: ShipModel, trial: Trial) -> Trial | None:
+    """Simulate a trial from its initial state and measured rudder.
+
+    Initial velocities that were derived are estimated (`with_start`). None if the model
+    runs away.
+    """
+    try:
+        return open_loop(model, with_start(model, trial))
+    except UnstableModelError:
+        return None
+
+
+def trial_metrics(
+    model: ShipModel, trial: Trial, prediction: Trial | None
+) -> dict[str, Any]:
+    """Errors of a prediction, and indices of measurement and prediction.
+
+    Returns `use`, `diverged`, `rmse` (SI; by channel, None for one that the model does
+    not predict) and for each index, by the same function, `measured` and `predicted`,
+    of overshoots also `closed_loop` (the rudder reversed at the measured headings),
+    None where the manoeuvre has no such index or never got there.
+    """
+    turning = ("advance_lengths", "transfer_lengths", "tactical_diameter_lengths")
+    metrics: dict[str, Any] = {
+        "use": trial.use,
+        "diverged": prediction is None,
+        "rmse": _errors(model, trial, prediction),
+        **dict.fromkeys((*ZIGZAG, *turning)),
+    }
+    read = index_reader(model, trial)
+    if read is None:
+        return metrics
+    measured = read(trial)
+    if measured is None:
+        return metrics
+
+    runs = {"measured": measured, "predicted": read(prediction)}
+    names: tuple[str, ...] = turning
+    if trial.kind == "zigzag":
+        names = ZIGZAG
+        again = None if prediction is None else closed_loop(model, trial)
+        runs["closed_loop"] = read(again)
+    for name in names:
+        metrics[name] = {
+            kind: getattr(indices, name, None) for kind, indices in runs.items()
+        }
+    return metrics
+
+
+def _errors(
+    model: ShipModel, trial: Trial, prediction: Trial | None
+) -> dict[str, float | None]:
+    """Root mean square errors by channel; None for one not known or not predicted."""
+    errors: dict[str, float | None] = dict.fromkeys(COMPARED)
+    if prediction is None:
+        return errors
+    for name in predicted_channels(model):
+        if name in trial:
+            error = prediction[name] - trial[name]
+            errors[name] = root_mean_square(error)
+    return errors
+
+
+def index_reader(model: ShipModel, trial: Trial) -> IndexReader | None:
+    """From a run of the trial's manoeuvre to its indices; None for other manoeuvres.
+
+    The reader gives None for a run without a channel that it needs, such as the
+    position.
+    """
+    length = model.particulars["length"]
+    indices: Callable[[Trial], Any]
+    if trial.kind == "turning-circle":
+        indices = partial(turning_indices, length=length)
+    elif trial.kind == "zigzag":
+        heading = switch_heading_deg(trial)
+        if heading is None:
+            return None
+        indices = partial(zigzag_indices, length=length, heading_deg=heading)
+    else:
+        return None
+
+    def read(run: Trial | None) -> Any:
+        if run is None:
+            return None
+        try:
+            return indices(run)
+        except InputError:
+            return None
+
+    return read

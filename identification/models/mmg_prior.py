@@ -1,0 +1,309 @@
+"""Prior of the coefficients of the MMG form.
+
+Those of a reference ship, or from main dimensions.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from identification.models.formulas import FORMULAS, main_dimensions
+from identification.models.hull_formulas import (
+    HULL_FORMULAS,
+    KIJIMA,
+    formula_coefficients,
+)
+from identification.models.similarity import (
+    AUTO,
+    LEAST_SIMILARITY,
+    check_alike,
+    correlations,
+    select_reference,
+    similarity_vector,
+)
+from shipgym import InputError, Particulars, ShipModel, load_model
+from shipgym.arrays import Floats
+from shipgym.checks import quoted
+from shipgym.ships.catalogue import REFERENCE_SHIPS
+from shipgym.ships.mmg import IDENTIFIED, dimensions, standard_form
+from shipgym.ships.particulars import ADDED_MASSES
+from shipgym.ships.structures import MMG
+
+
+class Deviation(NamedTuple):
+    """Standard deviation of a coefficient before any trial, about each kind of mean."""
+
+    reference: float
+    yoshimura: float
+    kijima: float
+
+
+#: With formulas at least the root mean square of what published coefficients of ships
+#: differ by from them (`test_mmg.py`); sources do not agree on the signs in N_vrr.
+DEVIATIONS = {
+    "mx": Deviation(0.005, 0.0062, 0.0062),
+    "my": Deviation(0.03, 0.04, 0.04),
+    "Jz": Deviation(0.002, 0.004, 0.004),
+    "R_0": Deviation(0.006, 0.006, 0.006),
+    "X_vv": Deviation(0.03, 0.06, 0.06),
+    "X_vr": Deviation(0.04, 0.084, 0.084),
+    "X_rr": Deviation(0.02, 0.03, 0.03),
+    "X_vvvv": Deviation(0.4, 0.6, 0.6),
+    "Y_v": Deviation(0.04, 0.08, 0.13),
+    "Y_r": Deviation(0.03, 0.05, 0.05),
+    "Y_vvv": Deviation(0.6, 0.6, 0.6),
+    "Y_vvr": Deviation(0.4, 0.83, 0.83),
+    "Y_vrr": Deviation(0.3, 0.3, 0.3),
+    "Y_rrr": Deviation(0.05, 0.053, 0.053),
+    "N_v": Deviation(0.02, 0.03, 0.03),
+    "N_r": Deviation(0.007, 0.016, 0.016),
+    "N_vvv": Deviation(0.1, 0.16, 0.31),
+    "N_vvr": Deviation(0.1, 0.17, 0.26),
+    "N_vrr": Deviation(0.05, 0.23, 0.23),
+    "N_rrr": Deviation(0.01, 0.03, 0.03),
+    "thrust": Deviation(0.25, 0.25, 0.25),
+    "w_P0": Deviation(0.1, 0.1, 0.1),
+    "C_1": Deviation(0.5, 0.5, 0.5),
+    "C_2": Deviation(0.25, 0.25, 0.25),
+    "C_2_side": Deviation(0.25, 0.25, 0.25),
+    "t_R": Deviation(0.05, 0.1, 0.1),
+    "a_H": Deviation(0.1, 0.12, 0.12),
+    "x_H": Deviation(0.05, 0.05, 0.05),
+    "l_R": Deviation(0.1, 0.2, 0.2),
+    "gamma_R": Deviation(0.12, 0.15, 0.15),
+    "gamma_R_side": Deviation(0.12, 0.12, 0.12),
+    "epsilon": Deviation(0.2, 0.2, 0.2),
+    "kappa": Deviation(0.12, 0.12, 0.12),
+    "f_alpha": Deviation(0.2, 0.47, 0.47),
+    "delta_0": Deviation(math.radians(1.0), math.radians(1.0), math.radians(1.0)),
+    "Y_0": Deviation(0.001, 0.001, 0.001),
+    "N_0": Deviation(0.0005, 0.0005, 0.0005),
+    "c_R": Deviation(0.5, 0.5, 0.5),
+    "speed_power": Deviation(0.5, 0.5, 0.5),
+    "N_absr": Deviation(0.003, 0.003, 0.003),
+    "N_rr": Deviation(0.008, 0.008, 0.008),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class MMGPrior:
+    """Normal distribution of the coefficients before any trial."""
+
+    source: str  # the reference ship, or whose formulas
+    ship: Particulars  # with what the MMG form needs, estimated where absent
+    mean: dict[str, float]  # of all coefficients, those known beforehand too
+    deviation: Floats  # of `IDENTIFIED`, shape (41,)
+    remarks: tuple[str, ...] = ()  # what a user has to know of it
+    #: of the candidates for the reference ship; empty for formulas
+    similarity: Mapping[str, float] | None = None
+
+
+def mmg_prior(source: str | ShipModel, particulars: Particulars) -> MMGPrior:
+    """The prior of a reference ship in the MMG form, or of formulas.
+
+    `source`: a reference ship, "auto" for the one most like this ship, or "yoshimura"
+    or "kijima"; `particulars`: with service speed; beam, draught, block coefficient and
+    what of rudder and propeller is known. Raises InputError for a reference ship of
+    other equations or unlike this one, and particulars that do not suffice.
+    """
+    ship = completed(particulars)
+    if isinstance(source, str) and source in HULL_FORMULAS:
+        prior = _formula_prior(source, ship)
+    elif isinstance(source, str) and source in FORMULAS:
+        raise InputError(
+            f"prior: expected {quoted(HULL_FORMULAS)} or a reference ship with"
+            f" structure 'mmg', got {source!r}"
+        )
+    else:
+        prior = _reference_prior(source, ship)
+
+    given = _given_added_mass(particulars)
+    prior.mean.update(given)
+    prior.mean["nD_U0"] = _self_propulsion(prior.mean, ship)
+    return prior
+
+
+def completed(particulars: Particulars) -> Particulars:
+    """Particulars with rudder and propeller of usual size where absent.
+
+    These are marked as estimated. Added masses are coefficients of the MMG form and
+    stand there alone. The rudder's area is that of Det Norske Veritas, L T / 100 (1 +
+    25 (B / L)^2).
+    """
+    ship = particulars.completed()
+    no_added_masses: dict[str, Any] = dict.fromkeys(ADDED_MASSES)
+    given = ship.estimated - no_added_masses.keys()
+    ship = replace(ship, **no_added_masses, estimated=given)
+
+    L = ship.length
+    B = ship.require("beam")
+    T = ship.require("draught")
+    usual_area = L * T / 100.0 * (1.0 + 25.0 * (B / L) ** 2)
+    area = ship.rudder_area or usual_area
+    span = 0.76 * T
+    rudders = ship.rudders or 1.0
+    usual = {
+        "rudder_area": area,
+        "propeller_diameter": 0.6 * T,
+        "rudder_aspect_ratio": span**2 * rudders / area,
+    }
+
+    absent = dict[str, Any]()
+    for name, value in usual.items():
+        if ship[name] is None:
+            absent[name] = value
+    estimated = ship.estimated | absent.keys()
+    return replace(ship, **absent, estimated=estimated)
+
+
+def _formula_prior(hull: str, ship: Particulars) -> MMGPrior:
+    deviations = []
+    for name in IDENTIFIED:
+        row = DEVIATIONS[name]
+        deviations.append(row.kijima if hull == KIJIMA else row.yoshimura)
+    return MMGPrior(
+        source=hull,
+        ship=ship,
+        mean=formula_coefficients(hull, ship),
+        deviation=np.array(deviations),
+        remarks=_out_of_range(ship),
+    )
+
+
+def _reference_prior(source: str | ShipModel, ship: Particulars) -> MMGPrior:
+    model, similarity = _reference(source, ship)
+    remarks: tuple[str, ...] = ()
+    like = similarity.get(model.name, 1.0)
+    if like < LEAST_SIMILARITY:
+        remarks = (
+            f"reference ship {model.name!r} is not like this one: similarity"
+            f" {like:.2f}; compare with prior = 'yoshimura'",
+        )
+    deviations = [DEVIATIONS[name].reference for name in IDENTIFIED]
+    return MMGPrior(
+        source=model.name,
+        ship=ship,
+        mean=reference_coefficients(model),
+        deviation=np.array(deviations),
+        remarks=remarks,
+        similarity=similarity,
+    )
+
+
+def _reference(
+    source: str | ShipModel, ship: Particulars
+) -> tuple[ShipModel, dict[str, float]]:
+    """The reference ship and the similarity of the candidates.
+
+    Refused where it has other equations, and the best of the candidates where none is
+    like the ship.
+    """
+    model = _in_mmg_form(source, ship)
+    vectors = {model.name: similarity_vector(model.particulars)}
+    for name, make in REFERENCE_SHIPS.items():
+        if name != "mariner":
+            candidate = make()
+            particulars = candidate.particulars.completed()
+            vectors[name] = similarity_vector(particulars)
+    own = similarity_vector(ship)
+    try:
+        similarity = correlations(own, vectors)
+    except InputError:  # too little is known to compare
+        return model, {}
+    if source == AUTO:
+        otherwise = "give prior = 'yoshimura' for formulas of the main dimensions"
+        check_alike(model.name, similarity[model.name], otherwise)
+    return model, similarity
+
+
+def _in_mmg_form(source: str | ShipModel, ship: Particulars) -> ShipModel:
+    """The reference ship named, or the one most like a ship; of the MMG form."""
+    forms = ("kvlcc2", MMG)
+    of_form = [
+        name for name, make in REFERENCE_SHIPS.items() if make().structure in forms
+    ]
+    named = source
+    if source == AUTO:
+        named, _ = select_reference(ship, candidates=of_form)
+    model = named if isinstance(named, ShipModel) else load_model(named)
+    if model.structure not in forms:
+        raise InputError(
+            f"reference_model: expected a ship in the MMG form, one of"
+            f" {quoted(of_form)} or a model file of structure 'mmg', got"
+            f" {model.name!r}; or give prior = 'yoshimura' for formulas"
+        )
+    return model
+
+
+def reference_coefficients(model: ShipModel) -> dict[str, float]:
+    """Coefficients of a reference ship in the general form."""
+    if model.structure == MMG:
+        return dict(model.coefficients)
+    return standard_form(
+        model.coefficients,
+        model.particulars["speed"],
+        model.service_shaft_speed,
+    )
+
+
+def _given_added_mass(p: Particulars) -> dict[str, float]:
+    """Added masses that were given, not estimated, by rho L^2 d / 2."""
+    symbols = {"mx": "X_udot", "my": "Y_vdot", "Jz": "N_rdot"}
+    given = {}
+    for symbol, name in symbols.items():
+        derivative = p[name]
+        if derivative is None or name in p.estimated:
+            continue
+        # the prime system is by rho L^3 / 2
+        draught = p.require("draught")
+        given[symbol] = -derivative * p.length / draught
+    return given
+
+
+def _self_propulsion(c: Mapping[str, float], ship: Particulars) -> float:
+    """Speed n D_P / U0 at which thrust balances resistance at service speed.
+
+    With x = n D_P / U0 and J = (1 - w) / x, thrust is that of K_T = k_0 + k_1 J + k_2
+    J^2 times x^2, so the balance is a quadratic in x.
+    """
+    hull = dimensions(ship)
+    propellers = hull["propellers"]
+    D_P = hull["D_P"]
+    L = ship.length
+    d = ship.require("draught")
+    slip = 1.0 - c["w_P0"]
+
+    # both by rho U0^2 D_P^2
+    thrust = (1.0 - c["t_P"]) * propellers * D_P**2 * c["thrust"]
+    resistance = c["R_0"] * 0.5 * L * d
+    balance = resistance / thrust
+
+    # k_0 x^2 + k_1 (1 - w) x + k_2 (1 - w)^2 = balance
+    half_slope = 0.5 * c["k_1"] * slip / c["k_0"]
+    constant = (c["k_2"] * slip**2 - balance) / c["k_0"]
+    return -half_slope + math.sqrt(half_slope**2 - constant)
+
+
+def _out_of_range(ship: Particulars) -> tuple[str, ...]:
+    """Remarks on main dimensions outside those that the formulas were made for.
+
+    To be read with caution: the databases behind them are not published whole.
+    """
+    L, B, T, C_b = main_dimensions(ship)
+    ratios = [
+        ("block coefficient", C_b, 0.50, 0.86),
+        ("L/B", L / B, 3.5, 7.5),
+        ("B/T", B / T, 2.0, 4.5),
+    ]
+    remarks = []
+    for name, value, low, high in ratios:
+        if not low <= value <= high:
+            remarks.append(
+                f"{name} {value:.3g} is outside the range of the regression formulas,"
+                f" {low:g} to {high:g}: their coefficients are doubtful; name a"
+                " reference_model like this ship"
+            )
+    return tuple(remarks)

@@ -1,0 +1,245 @@
+"""Stretches of trials, each of which a model sails from a start of its own."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from identification.samples import preprocess
+from identification.samples.gaps import between_gaps
+from identification.samples.rudder import Rudder, rebuild, straight
+from shipgym import ShipModel, Trial
+from shipgym.arrays import Floats, Integers
+from shipgym.ships import Structure
+from shipgym.ships.simulate import LONGEST_STEP, wind_accelerations
+from shipgym.trials.resampling import usual_step
+
+BLOCK = 0.05  # time over which residuals are averaged, of that to sail one ship length
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """A stretch of a trial."""
+
+    trial: int  # index of the trial
+    #: time, s, rudder, rad, shaft speed, 1/s, and the accelerations in surge, sway and
+    #: yaw by wind, on the grid of the integration, shape (n_points, 6)
+    inputs: Floats
+    #: sample at each point of the grid, -1 for none, shape (n_points,)
+    samples: Integers
+    measured: Floats  # what is compared with, shape (n_samples, n_channels)
+    #: first sample of each block over which residuals are averaged, shape (n_blocks,)
+    blocks: Integers
+    times: Floats  # when the blocks begin, s, shape (n_blocks,)
+    #: state at the first sample, in the order of the model's `state_names`, shape
+    #: (n_state,)
+    start: Floats
+    weight: float = 1.0  # of its squared residuals
+
+    @property
+    def duration(self) -> float:
+        """Time from its first sample to its last, s."""
+        return float(self.inputs[-1, 0] - self.times[0])
+
+    @property
+    def has_wind(self) -> bool:
+        """True where wind accelerates the ship in it."""
+        return bool(self.inputs[:, 3:].any())
+
+    @property
+    def block_sizes(self) -> Integers:
+        """Samples in each block, shape (n_blocks,)."""
+        return np.diff(self.blocks, append=len(self.measured))
+
+
+def compared_channels(model: ShipModel, trials: Sequence[Trial]) -> tuple[str, ...]:
+    """Channels whose residuals count: velocities with equations, and heading.
+
+    Of yaw alone only the heading, where the yaw rate was derived from it.
+    """
+    velocities = _velocities(model)
+    heading = "r" in velocities and all("psi" in trial for trial in trials)
+    if not heading:
+        return velocities
+    is_derived = all("r" in trial.derived for trial in trials)
+    if velocities == ("r",) and is_derived:
+        return ("psi",)
+    return (*velocities, "psi")
+
+
+def _velocities(model: ShipModel) -> tuple[str, ...]:
+    """Velocities that the model has equations of."""
+    table = model.dynamics
+    if isinstance(table, Structure):
+        return tuple(table.equations)
+    return ("u", "v", "r")
+
+
+def cut(
+    trials: Sequence[Trial],
+    model: ShipModel,
+    channels: Sequence[str],
+    lengths: float,
+    staggered: bool,
+    interval: float = 0.0,
+) -> list[Segment]:
+    """Cut trials into segments; staggered, again from half a segment later on.
+
+    A gap in time ends a segment. A segment is the time to sail so many ship `lengths`
+    at service speed; it starts from the smoothed state. Compared are samples at least
+    an `interval` apart, in ship lengths; where it is 0, all.
+    """
+    duration = lengths * model.travel_time
+    least_step = interval * model.travel_time
+    shifts = (0.0, 0.5) if staggered else (0.0,)
+    segments = []
+    for index, trial in enumerate(trials):
+        for piece in between_gaps(trial, model.particulars):
+            recorded = _recorded(index, piece, model)
+            for rows in _segment_rows(piece.t, duration, shifts, least_step):
+                segment = _segment(recorded, rows, channels, model)
+                segments.append(segment)
+    return segments
+
+
+def _segment_rows(
+    t: Floats, duration: float, shifts: Sequence[float], least_step: float
+) -> Iterator[slice]:
+    """Samples of each segment of a record, a least step apart, s."""
+    sampling_steps = least_step / usual_step(t)
+    every = max(int(sampling_steps + 1e-9), 1)
+    for shift in shifts:
+        edges = segment_edges(t, duration, shift)
+        for first, last in pairwise(edges):
+            yield slice(first, last + 1, every)
+
+
+def segment_edges(t: Floats, duration: float, shift: float) -> Integers:
+    """First samples of the segments of a record, and its last sample.
+
+    As many equal segments as come nearest to a duration, s, from a `shift` in durations
+    on. Segments of fewer than five samples are joined. None where nothing is left.
+    """
+    fewest = 5
+    span = t[-1] - t[0]
+    skipped = shift * duration
+    if skipped >= span:
+        return np.zeros(0, dtype=np.int64)
+
+    count = max(round(span / duration - shift), 1)
+    parts = np.arange(count) * (span - skipped) / count
+    begins = t[0] + skipped + parts
+    firsts = np.searchsorted(t, begins)
+    last = len(t) - 1
+    if last < fewest:
+        return np.array([firsts[0], last])
+
+    edges = np.append(firsts, last)
+    long_enough = np.diff(edges) >= fewest
+    long_enough[0] = True  # what is too short joins the segment before it
+    return np.append(firsts[long_enough], last)
+
+
+@dataclass(frozen=True, eq=False)
+class _Recorded:
+    """A record without gaps, as segments are cut from it."""
+
+    index: int  # of its trial
+    trial: Trial
+    states: Floats  # smoothed, shape (n_samples, n_state)
+    rudder: Rudder  # between the samples too
+
+
+def _recorded(index: int, trial: Trial, model: ShipModel) -> _Recorded:
+    velocities = (trial[name] for name in _velocities(model))
+    if preprocess.is_noisy(trial.t, velocities):
+        rudder = straight(trial.t, trial["delta"])
+    else:
+        rudder = rebuild(trial.t, trial["delta"], model.steering)
+    return _Recorded(
+        index=index,
+        trial=trial,
+        states=smoothed_states(trial, model),
+        rudder=rudder,
+    )
+
+
+def smoothed_states(trial: Trial, model: ShipModel) -> Floats:
+    """States along a trial, smoothed but for rudder and shaft.
+
+    The position, and what was not recorded, is 0. Shape (n_samples, n_state).
+    """
+    states = np.zeros((len(trial), len(model.state_names)))
+    for column, name in enumerate(model.state_names):
+        if name not in trial or name in ("x", "y"):
+            continue
+        values = trial[name]
+        if name not in ("delta", "n"):
+            values = preprocess.smooth(trial.t, values)
+        states[:, column] = values
+    return states
+
+
+def _segment(
+    recorded: _Recorded, rows: slice, channels: Sequence[str], model: ShipModel
+) -> Segment:
+    trial = recorded.trial
+    t = trial.t[rows]
+    longest_step = LONGEST_STEP * model.travel_time
+    grid = _grid(t, longest_step, recorded.rudder.corners)
+    samples = np.full(len(grid), -1)
+    sampled = np.searchsorted(grid, t)
+    samples[sampled] = np.arange(len(t))
+
+    blocks = _block_starts(t, BLOCK * model.travel_time)
+    return Segment(
+        trial=recorded.index,
+        inputs=_inputs(recorded, grid, model),
+        samples=samples,
+        measured=np.column_stack([trial[name][rows] for name in channels]),
+        blocks=blocks,
+        times=t[blocks],
+        start=recorded.states[rows.start],
+    )
+
+
+def _block_starts(t: Floats, duration: float) -> Integers:
+    """First sample of each block of a duration, s, at most, or of one sample."""
+    sampling_steps = duration / usual_step(t)
+    per_block = max(int(sampling_steps), 1)
+    return np.arange(0, len(t), per_block)
+
+
+def _inputs(recorded: _Recorded, grid: Floats, model: ShipModel) -> Floats:
+    """Rudder, shaft and wind at times of a grid, as in `Segment.inputs`."""
+    trial = recorded.trial
+    rudder = recorded.rudder(grid)
+    shaft = np.zeros(len(grid))
+    if "n" in trial:
+        shaft = np.interp(grid, trial.t, trial["n"])
+
+    columns = [grid, rudder, shaft]
+    wind = wind_accelerations(trial, model.dynamics)
+    for acceleration in wind.T:
+        column = np.interp(grid, trial.t, acceleration)
+        columns.append(column)
+    return np.column_stack(columns)
+
+
+def _grid(t: Floats, longest_step: float, corners: Floats) -> Floats:
+    """Times of integration, s: samples, points between, and corners of the rudder."""
+    sampling = np.diff(t)
+    steps = np.ceil(sampling / longest_step - 1e-9)
+    counts = np.maximum(steps, 1).astype(int)
+
+    points = [t[-1]]
+    for begin, duration, count in zip(t[:-1], sampling, counts, strict=True):
+        parts = np.arange(count)
+        between = begin + duration * parts / count
+        points.extend(between)
+
+    after_first = corners > t[0]
+    before_last = corners < t[-1]
+    inside = corners[after_first & before_last]
+    return np.union1d(points, inside)

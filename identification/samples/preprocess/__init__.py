@@ -1,0 +1,95 @@
+"""Preparation of a noisy record: channels that can be differentiated."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from identification.samples.preprocess.filters import median, savitzky_golay, smooth
+from identification.samples.preprocess.noise import (
+    NOISY,
+    is_noisy,
+    noise_level,
+    noise_ratio,
+)
+from identification.samples.preprocess.repair import outliers, repaired
+from shipgym import Trial
+from shipgym.arrays import Floats
+from shipgym.checks import check_choice, check_flag
+
+#: Filters of single channels by name.
+FILTERS: dict[str, Callable[[Floats, Floats], Floats]] = {
+    "spline": smooth,
+    "savgol": savitzky_golay,
+    "median": median,
+}
+
+#: What `identify` may do with noisy channels.
+PREPROCESSING = (*FILTERS, "rts", "none")
+
+
+@dataclass(frozen=True)
+class Preprocessing:
+    """Smoothing of noisy channels before the regression.
+
+    Parameters
+    ----------
+    smoothing : {"spline", "savgol", "median", "rts", "none"}
+        Smoothing splines fitted to the noise level; Savitzky-Golay filter; running
+        median; Kalman filter and Rauch-Tung-Striebel smoother, with position and
+        heading; or channels as recorded.
+    repair : bool
+        Whether outliers are replaced and dropouts of up to 10 steps filled first; the
+        provenance counts them.
+    """
+
+    smoothing: str = "spline"
+    repair: bool = False
+
+    def __post_init__(self) -> None:
+        check_choice(self.smoothing, PREPROCESSING, "preprocessing")
+        check_flag(self.repair, "repair")
+
+
+def smoothed_channels(
+    trial: Trial,
+    names: Sequence[str],
+    smoothing: str = "spline",
+) -> dict[str, Floats]:
+    """Some channels of a trial, smoothed (`Preprocessing`).
+
+    The rudder, which has corners, is left as it is; "rts" smooths a shaft speed by a
+    spline.
+    """
+    check_choice(smoothing, PREPROCESSING, "preprocessing")
+    kept = {"delta"}
+    if smoothing == "none":
+        kept = set(names)
+    if smoothing == "rts":
+        from identification.samples.preprocess import kinematics
+
+        trial = kinematics.smooth_kinematics(trial)
+        kept |= {*kinematics.HEADING, *kinematics.PLANE}
+
+    filtered = FILTERS.get(smoothing, smooth)
+    channels = {}
+    for name in names:
+        channels[name] = trial[name]
+        if name not in kept:
+            channels[name] = filtered(trial.t, trial[name])
+    return channels
+
+
+__all__ = [
+    "FILTERS",
+    "NOISY",
+    "PREPROCESSING",
+    "Preprocessing",
+    "is_noisy",
+    "median",
+    "noise_level",
+    "noise_ratio",
+    "outliers",
+    "repaired",
+    "savitzky_golay",
+    "smooth",
+    "smoothed_channels",
+]

@@ -1,0 +1,328 @@
+"""The current of each trial, which is known or estimated, and how sure it is."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from identification.samples.current import estimate_current
+from identification.samples.velocities import (
+    CURRENT_COLUMNS,
+    SIGNIFICANT,
+    through_water,
+)
+from shipgym import InputError, Trial
+from shipgym.arrays import Floats
+
+REMEDY = (
+    "add a turn of a whole circle, or runs on other headings at the same shaft speed,"
+    " give the current (current = { north = 0.2, east = -0.1 }, m/s), or take none out"
+    ' (current = "none")'
+)
+
+
+@dataclass(frozen=True, eq=False)
+class TrialCurrent:
+    """The current of one trial.
+
+    Attributes
+    ----------
+    velocity : array of shape (2,) or (2, n_samples)
+        Towards north and east, m/s.
+    covariance : array of shape (2, 2) or None
+        None for one that is known.
+    source : str
+        "columns", "given", "all trials" or "trial".
+    """
+
+    velocity: Floats
+    covariance: Floats | None
+    source: str
+
+    @property
+    def mean(self) -> Floats:
+        """Mean over the trial, m/s, shape (2,)."""
+        return np.asarray(np.reshape(self.velocity, (2, -1)).mean(axis=1))
+
+    @property
+    def probability(self) -> float:
+        """Probability of a current as far from zero by chance; 0 for a known one."""
+        if self.covariance is None:
+            return 0.0
+        return wald_probability(self.mean, self.covariance)
+
+
+def without_current(
+    found: dict[str, Trial],
+    length: float,
+    speed: float,
+    option: Any,
+    remarks: list[str],
+) -> dict[str, Any]:
+    """Take the current out of trials, by name, where it is known or asked for.
+
+    Returns a report on each; `remarks` get those that were doubtful.
+    """
+    trials = list(found.values())
+    one_heading = _keep_to_one_heading(trials)
+    currents = currents_of(
+        trials,
+        length=length,
+        speed=speed,
+        option=option,
+    )
+    rows: dict[str, Any] = {}
+    doubtful: dict[str, list[str]] = {}
+    for name, current in currents.items():
+        doubt = _doubt(current, speed, one_heading)
+        if doubt:
+            if option != "auto" or current.covariance is None:
+                _refuse(name, doubt, current)
+            doubtful.setdefault(doubt, []).append(name)
+
+        is_chance = option == "auto" and current.probability > SIGNIFICANT
+        taken_out = not doubt and not is_chance
+        if taken_out:
+            found[name] = through_water(found[name], *current.velocity)
+        rows[name] = _row(current, taken_out, one_heading)
+    remarks += _remarks(doubtful)
+    remarks += _remark_magnetic(trials)
+    return rows
+
+
+def _remark_magnetic(trials: Iterable[Trial]) -> list[str]:
+    """A remark on trials over ground whose heading counts from magnetic north."""
+    names = []
+    for trial in trials:
+        if trial.over_ground and trial.magnetic:
+            names.append(PurePath(trial.name).name)
+    if not names:
+        return []
+    return [
+        f"{', '.join(names)}: no current is looked for, as the heading is magnetic and"
+        " the variation would look like drift; write variation_deg (east positive) in"
+        " [sensors]"
+    ]
+
+
+def _remarks(doubtful: dict[str, list[str]]) -> list[str]:
+    """A sentence for each doubt, with the trials that it concerns."""
+    remarks = []
+    for doubt, names in doubtful.items():
+        trials = ", ".join(PurePath(name).name for name in names)
+        remark = f"{trials}: no current is removed: {doubt}; {REMEDY}"
+        remarks.append(remark)
+    return remarks
+
+
+def _row(current: TrialCurrent, taken_out: bool, one_heading: bool) -> dict[str, Any]:
+    """A current for the provenance; how certain it is, unless from one heading."""
+    north, east = current.mean.tolist()
+    row = {
+        "north": north,
+        "east": east,
+        "source": current.source,
+        "taken_out": taken_out,
+    }
+    if current.covariance is not None and not one_heading:
+        errors = np.sqrt(np.diag(current.covariance))
+        row["standard_errors"] = errors.tolist()
+        row["probability"] = current.probability
+    return row
+
+
+def _refuse(name: str, doubt: str, current: TrialCurrent) -> None:
+    remedy = REMEDY
+    if current.covariance is None:
+        remedy = "give it in m/s, towards north and east"
+    raise InputError(f"trial {name!r}: no current can be removed: {doubt}; {remedy}")
+
+
+def _doubt(current: TrialCurrent, speed: float, one_heading: bool) -> str:
+    """Reason why a current cannot be removed; empty where it can."""
+    if current.covariance is not None:
+        # drift by the current and drift by the ship's own neutral helm look the same
+        if one_heading:
+            return "the trials keep to one heading"
+        errors = np.sqrt(np.diag(current.covariance))
+        largest_error = errors.max()
+        if largest_error > 0.05 * speed:
+            return f"its standard error is {largest_error:.2g} m/s"
+
+    size = np.hypot(*current.mean)
+    if size > speed:
+        return f"expected less than the ship's speed of {speed:.3g} m/s, got {size:.2g}"
+    return ""
+
+
+def _keep_to_one_heading(trials: Iterable[Trial]) -> bool:
+    """Return whether trials are so near to one heading that speed hides the current.
+
+    Only trials to fit whose velocities are over ground count.
+    """
+    headings = []
+    for trial in trials:
+        if trial.over_ground and trial.use == "fit" and "psi" in trial:
+            headings.append(trial["psi"])
+    if not headings:
+        return False
+    directions = np.exp(1j * np.concatenate(headings))
+    concentration = abs(directions.mean())
+    return bool(concentration > 0.85)
+
+
+def currents_of(
+    trials: Sequence[Trial],
+    length: float,
+    speed: float,
+    option: Any,
+) -> dict[str, TrialCurrent]:
+    """Currents by trial, of those whose current is known or can be estimated.
+
+    The trials to fit have one current unless they contradict it or are asked one by
+    one. That of a trial held out is theirs, or is found by their coefficients. A
+    current is estimated from trials of at least five ship lengths.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        None of them skipped.
+    length, speed : float
+        Of the ship, m and m/s.
+    option : str or mapping
+        As of `Options.current`.
+    """
+    found: dict[str, TrialCurrent] = {}
+    unknown = []
+    shortest = 5.0 * length / speed
+    for trial in trials:
+        known = _known_current(trial, option)
+        if known is not None:
+            source = "columns" if CURRENT_COLUMNS[0] in trial else "given"
+            found[trial.name] = TrialCurrent(
+                velocity=known,
+                covariance=None,
+                source=source,
+            )
+        elif _shows_current(trial) and trial.duration > shortest:
+            unknown.append(trial)
+    estimated = _estimated_currents(
+        unknown,
+        length=length,
+        speed=speed,
+        option=option,
+    )
+    return found | estimated
+
+
+def _shows_current(trial: Trial) -> bool:
+    needed = {"psi", "u", "v", "r", "delta"}
+    is_true = not trial.magnetic
+    return trial.over_ground and is_true and trial.channels.keys() >= needed
+
+
+def _estimated_currents(
+    trials: Sequence[Trial],
+    length: float,
+    speed: float,
+    option: Any,
+) -> dict[str, TrialCurrent]:
+    fitted = [trial for trial in trials if trial.use == "fit"]
+    if not fitted:
+        return {}
+    shared = option != "trial"
+    estimate = estimate_current(
+        fitted,
+        length=length,
+        speed=speed,
+        shared=shared,
+    )
+    if option == "auto" and len(fitted) > 1:
+        each = estimate_current(
+            fitted,
+            length=length,
+            speed=speed,
+            shared=False,
+        )
+        if _contradict(each.mean, each.covariance):
+            estimate, shared = each, False
+
+    found: dict[str, TrialCurrent] = {}
+    for trial in trials:
+        own = estimate
+        place = 0
+        if not shared and trial.use == "fit":
+            place = fitted.index(trial)
+        elif not shared:
+            own = estimate_current(
+                [trial],
+                length=length,
+                speed=speed,
+                shared=True,
+                known=estimate.coefficients,
+            )
+        pair = slice(2 * place, 2 * place + 2)
+        found[trial.name] = TrialCurrent(
+            velocity=own.mean[pair],
+            covariance=own.covariance[pair, pair],
+            source="all trials" if shared else "trial",
+        )
+    return found
+
+
+def _contradict(currents: Floats, covariance: Floats, chance: float = 1e-6) -> bool:
+    """Return whether the currents of trials differ by more than chance.
+
+    The chance is small because their covariance is an average over few blocks.
+    """
+    n_others = len(currents) // 2 - 1
+    first = -np.ones((n_others, 1))
+    others = np.eye(n_others)
+    from_first = np.hstack([first, others])
+    apart = np.kron(from_first, np.eye(2))
+
+    differences = apart @ currents
+    of_differences = apart @ covariance @ apart.T
+    probability = wald_probability(differences, of_differences)
+    return probability < chance
+
+
+def _known_current(trial: Trial, option: Any) -> Floats | None:
+    """North and east of a current in columns or given; None where unknown.
+
+    Shape (2,) or (2, n_samples).
+    """
+    given = None
+    if isinstance(option, Mapping):
+        given = np.array([option["north"], option["east"]], dtype=float)
+    if not trial.channels.keys() >= set(CURRENT_COLUMNS):
+        return given if trial.over_ground else None
+
+    columns = np.array([trial[name] for name in CURRENT_COLUMNS])
+    if given is not None:
+        _check_agreement(trial, columns.mean(axis=1), given)
+    return columns
+
+
+def _check_agreement(
+    trial: Trial, means: Floats, given: Floats, contradiction: float = 0.1
+) -> None:
+    """Refuse a given current that is not that of the columns, m/s."""
+    difference = means - given
+    if np.hypot(*difference) > contradiction:
+        north, east = given
+        mean_north, mean_east = means
+        raise InputError(
+            f"trial {trial.name!r}: expected columns current_north and current_east to"
+            f" agree with current = {{ north = {north:g}, east = {east:g} }}, got means"
+            f" of {mean_north:.2f} and {mean_east:.2f} m/s; leave one of them out"
+        )
+
+
+def wald_probability(mean: Floats, covariance: Floats) -> float:
+    """Probability of values as far from zero by chance (Wald's test)."""
+    statistic = mean @ np.linalg.solve(covariance, mean)
+    return float(chi2.sf(statistic, len(mean)))

@@ -1,0 +1,165 @@
+"""Accelerations of a ship by the wind of her trials: measured, or constant in each."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from identification.samples.samples import Samples
+from identification.samples.velocities import CURRENT_COLUMNS
+from shipgym import InputError, Particulars, Trial
+from shipgym.arrays import Floats
+from shipgym.sea.wind import AIR_DENSITY, WindCurves, wind_curves
+from shipgym.sea.wind_coefficients import WindTable
+from shipgym.ships.inertia import particulars_inertia
+from shipgym.ships.simulate import WIND
+from shipgym.ships.structures import MMG
+from shipgym.trials.navigation import rotate_to_body
+
+
+def measured_wind(
+    trial: Trial,
+    particulars: Particulars,
+    option: str | Mapping[str, Any],
+) -> Trial:
+    """The trial with the accelerations by the wind of its columns.
+
+    The trial itself where it has none. Velocities through the water are completed by a
+    current in columns.
+
+    Parameters
+    ----------
+    trial : Trial
+        With wind_speed, wind_from, psi, u and v.
+    particulars : Particulars
+        Of the ship.
+    option : str or mapping
+        Coefficients as in `shipgym.sea.Wind`, or a table of ``coefficients``, by name
+        or a table themselves, and ``relative``: whether speed and direction are those
+        felt on board, the latter from the bow.
+    """
+    table: dict[str, Any] = {"coefficients": option}
+    if isinstance(option, Mapping):
+        table = dict(option)
+    needed = {"wind_speed", "wind_from", "psi", "u", "v"}
+    if not needed <= trial.channels.keys():
+        return trial
+
+    curves = _curves(particulars, table.get("coefficients", "auto"))
+    relative = table.get("relative", False)
+    forces = _forces_on(trial, curves, relative)
+    inertia = particulars_inertia(particulars.completed())[:, :3]
+    accelerations = np.linalg.solve(inertia, forces)
+    channels = dict(zip(WIND.values(), accelerations, strict=True))
+    return trial.with_channels(channels)
+
+
+def _forces_on(trial: Trial, curves: WindCurves, relative: bool) -> Floats:
+    """X, Y and N by the wind of a trial, shape (3, n_samples)."""
+    ahead, aside = _felt_wind(trial, relative)
+    forces = _forces(curves, ahead, aside)
+    # her resistance in still air is the model's own
+    still_ahead, *_ = curves.X
+    u = trial["u"]
+    forces[0] -= 0.5 * AIR_DENSITY * still_ahead * u**2
+    return forces
+
+
+def _forces(curves: WindCurves, ahead: Floats, aside: Floats) -> Floats:
+    """X, Y and N by a wind felt from ahead and starboard, shape (3, n_samples)."""
+    angle = np.arctan2(aside, ahead)
+    coefficients = []
+    for row in (curves.X, curves.Y, curves.N):
+        at_angle = np.interp(angle, curves.angle, row, period=2.0 * np.pi)
+        coefficients.append(at_angle)
+    square = ahead**2 + aside**2
+    pressure = 0.5 * AIR_DENSITY * square
+    return pressure * np.array(coefficients)
+
+
+def _curves(particulars: Particulars, coefficients: Any) -> WindCurves:
+    """Wind coefficients by their name, or by a table of them."""
+    if isinstance(coefficients, Mapping):
+        given = WindTable.from_dict(coefficients, "wind coefficients")
+        return wind_curves(particulars, given)
+    if coefficients == "auto":
+        coefficients = "blendermann"
+    return wind_curves(particulars, coefficients)
+
+
+def _felt_wind(trial: Trial, relative: bool) -> tuple[Floats, Floats]:
+    """Wind felt on board, from ahead and from starboard, m/s."""
+    speed = trial["wind_speed"]
+    direction = trial["wind_from"]
+    along = speed * np.cos(direction)
+    across = speed * np.sin(direction)
+    if relative:
+        return along, across
+
+    north = along
+    east = across
+    has_current = trial.channels.keys() >= set(CURRENT_COLUMNS)
+    if has_current and not trial.over_ground:
+        north = north + trial["current_north"]
+        east = east + trial["current_east"]
+    ahead, aside = rotate_to_body(north, east, trial["psi"])
+    return ahead + trial["u"], aside + trial["v"]
+
+
+def constant_wind(
+    trials: Sequence[Trial],
+    samples: Samples,
+    structure: Any,
+) -> dict[str, dict[str, float]]:
+    """Constant sway and yaw acceleration that the regression asks for, by trial.
+
+    A constant of the structure's own takes their mean. The MMG form has no regression:
+    InputError.
+    """
+    if structure == MMG:
+        raise InputError(
+            "wind: expected a structure that is linear in its coefficients with"
+            " 'constant', or columns wind_speed and wind_from, got structure 'mmg'"
+        )
+    found: dict[str, dict[str, float]] = {trial.name: {} for trial in trials}
+    for q in ("v", "r"):
+        if q in samples.targets:
+            constants = _constants(samples, q, len(trials))
+            for trial, constant in zip(trials, constants.tolist(), strict=True):
+                found[trial.name][WIND[q]] = constant
+    return found
+
+
+def _constants(samples: Samples, equation: str, n_trials: int) -> Floats:
+    """The constant of each trial in the regression of an equation."""
+    features = samples.features[equation]
+    targets = samples.targets[equation]
+    is_own = samples.trial[:, None] == np.arange(n_trials)
+    of_trials = is_own * samples.duration[:, None]
+    columns = np.hstack([features, of_trials])
+    solution, *_ = np.linalg.lstsq(columns, targets)
+    constants: Floats = solution[-n_trials:]
+    if _explains(features, samples.duration):
+        constants = constants - constants.mean()
+    return constants
+
+
+def _explains(features: Floats, target: Floats, rounding: float = 1e-6) -> bool:
+    """Tell whether features explain a target but for rounding."""
+    solution, *_ = np.linalg.lstsq(features, target)
+    left = target - features @ solution
+    size_left = np.linalg.norm(left)
+    size = np.linalg.norm(target)
+    return bool(size_left < rounding * size)
+
+
+def with_constant_wind(
+    trial: Trial, constants: Mapping[str, Mapping[str, float]]
+) -> Trial:
+    """The trial with its constants of all, by name; itself where it has none."""
+    own = constants.get(trial.name, {})
+    if not own:
+        return trial
+    return trial.with_channels(
+        {name: np.full(len(trial), value) for name, value in own.items()}
+    )

@@ -1,5 +1,0 @@
-"""Search for settings: optimisers behind one signature, imported on first use."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

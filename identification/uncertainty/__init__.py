@@ -1,1 +1,0 @@
-"""Uncertainty of the coefficients."""
