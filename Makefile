@@ -76,7 +76,6 @@ evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/every_structure.py --draws 40 --out build/every_structure.jsonl
 	$(BIN)/python scripts/every_structure.py --draws 40 --out build/every_structure.jsonl --new
 	$(BIN)/python scripts/bridge_logs.py
-	$(BIN)/python scripts/standards.py
 	$(BIN)/python scripts/run_notebooks.py
 	$(BIN)/python scripts/tutorial.py
 

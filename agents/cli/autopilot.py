@@ -53,13 +53,6 @@ def autopilot_command(
             ),
         ),
     ] = None,
-    standards: Annotated[
-        bool,
-        Option(
-            "--standards",
-            help="Simulate topics of ISO 11674 and IEC 62065, with our own limits.",
-        ),
-    ] = False,
     tune: Annotated[
         float,
         Option(
@@ -98,7 +91,6 @@ def autopilot_command(
             options=options,
             agents=agents or (),
             designs=designs,
-            standards=standards,
             tune_seconds=tune,
             progress=on_progress,
             where=JobEngine(engine, workers, address),
@@ -141,7 +133,7 @@ def _print_verification(
 ) -> None:
     """Print predictions, criteria, ranking and tracks."""
     from agents.cli import tables
-    from agents.cli.terminal import console, say, warn
+    from agents.cli.terminal import console, say
     from identification.judging.warnings import held_out_error
 
     manoeuvres = verification.manoeuvres
@@ -153,12 +145,6 @@ def _print_verification(
     console.print(f"\nunstable draws: {int(manoeuvres.unstable.sum())} of {draws}\n")
     console.print(tables.ranking_table(result))
     console.print()
-    for row in verification.standards:
-        if not row.passed:
-            warn(
-                f"{row.standard}, {row.topic.lower()}: {row.value} {row.unit}, limit"
-                f" {row.limit:g}"
-            )
     for name, track in result.metrics["tracks"].items():
         console.print(
             f"{name.upper()} on the track: largest cross-track error"

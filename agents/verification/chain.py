@@ -55,7 +55,6 @@ def build_autopilot(
     options: Mapping[str, Any] | None = None,
     agents: Sequence[str | Path] = (),
     designs: Sequence[str] = DESIGNS,
-    standards: bool = False,
     tune_seconds: float = 0.0,
     progress: Progress | None = None,
     where: JobEngine = HERE,
@@ -71,11 +70,9 @@ def build_autopilot(
     of the episodes; `options`: of `identify`, by name, trials by file; those not given
     are the ship file's; `agents`: files of autopilots to verify beside those designed,
     or names of pretrained ones (`load_agent`); `designs`: kinds of controller to
-    design, of which those that lead another one keep to a track; `standards`: whether
-    to simulate what the standards of heading and track control ask for;
-    `tune_seconds`: of processor for a search of each design's settings, 0 for none;
-    `progress`:
-    called as the work goes on; `where`: where the models drawn are worked on; the
+    design, of which those that lead another one keep to a track; `tune_seconds`: of
+    processor for a search of each design's settings, 0 for none; `progress`: called as
+    the work goes on; `where`: where the models drawn are worked on; the
     results are the same. Raises InputError for anything wrong with the files or
     arguments; nothing is written then.
     """
@@ -117,7 +114,8 @@ def build_autopilot(
         result = or_simpler(examined_fit(fit), of_structure)
         write_agents(result, draft)
         try:
-            result = reported(result, draft, standards, tell)
+            with stage(tell, "writing the report"):
+                write_findings(result, draft)
         except OSError:
             raise
         except Exception as error:  # a fault of ours costs nobody the autopilots
@@ -247,39 +245,6 @@ def check_guest(guest: Agent, model: ShipModel, where: str) -> None:
             " shipgym benchmark"
         )
     check_fits(guest, task, model, where)
-
-
-def with_standards(found: Verification, model: ShipModel) -> Verification:
-    """A verification with the standards of its best heading and path autopilot."""
-    from agents.verification.standards import standards
-
-    refused = found.refused
-    designs = []
-    for pilot in found.pilots:
-        if pilot.design is not None and pilot.key not in refused:
-            designs.append(pilot.design)
-    best = designs[0]
-    tracks = []
-    for track in found.tracks:
-        sees_turns = "path_radius" in track.controller.gains
-        if sees_turns and track.key not in refused:
-            tracks.append(track)
-    requirements = standards(model, best, tracks)
-    return replace(found, standards=tuple(requirements))
-
-
-def reported(
-    result: AutopilotResult, folder: Path, standards: bool, tell: Progress
-) -> AutopilotResult:
-    """Result with its standards if asked for, after figures and report are written."""
-    found = result.verification
-    if standards and found is not None and result.refusal is None:
-        with stage(tell, "standards"):
-            tested = with_standards(found, result.model)
-            result = replace(result, verification=tested)
-    with stage(tell, "writing the report"):
-        write_findings(result, folder)
-    return result
 
 
 def write_agents(result: AutopilotResult, folder: Path) -> None:

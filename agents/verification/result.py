@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +21,6 @@ from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
     from agents.agent_file import Agent
-    from agents.verification.standards import Requirement
 
 
 STEP_DEG = 20.0
@@ -66,8 +64,6 @@ class Verification:
     #: autopilots that could not be designed on the model, and why
     refused: dict[str, str]
     tracks: tuple[Track, ...] = ()  # of autopilots that keep to a track
-    #: what the standards of heading and track control ask for
-    standards: tuple[Requirement, ...] = ()
     #: draws that count against a design: the others run away whatever steers them,
     #: shape (n_draws,); None for all
     counted: Flags | None = None
@@ -154,17 +150,7 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
         "retuned": found.retuned,
         "tuned": found.tuned,
         "tracks": {track.key: track_metrics(track) for track in found.tracks},
-        "standards": _standards_metrics(found.standards),
     }
-
-
-def _standards_metrics(standards: Sequence[Requirement]) -> dict[str, Any]:
-    """Requirements by name, with their verdicts."""
-    metrics = {}
-    for requirement in standards:
-        fields = asdict(requirement)
-        metrics[requirement.name] = {**fields, "passed": requirement.passed}
-    return metrics
 
 
 def track_metrics(track: Track) -> dict[str, Any]:

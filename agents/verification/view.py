@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from agents.verification.result import (
 from identification.report.view import Card
 from shipgym.manoeuvres import Criterion
 from shipgym.pages import NONE, fixed, number, percent
-
-if TYPE_CHECKING:
-    from agents.verification.standards import Requirement
 
 
 @dataclass(frozen=True)
@@ -90,7 +87,6 @@ class VerificationView:
     retuned: dict[str, str]
     tuned: dict[str, str]
     tracks: dict[str, dict[str, Any]]
-    standards: Sequence[Requirement]
 
 
 def verification_view(found: Verification, length: float) -> VerificationView:
@@ -128,7 +124,6 @@ def verification_view(found: Verification, length: float) -> VerificationView:
         retuned=found.retuned,
         tuned=found.tuned,
         tracks={track.key.upper(): track_metrics(track) for track in found.tracks},
-        standards=found.standards,
     )
 
 

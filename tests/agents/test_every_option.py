@@ -65,7 +65,7 @@ LINES = (
     ("trials tanker --draws 0 --depth 25", 0),
     (
         f"autopilot ship.toml {LINEAR} --draws 2 --seed 1 --agent pid.json --autopilots"
-        " lq,turn-rate,los --standards --engine local --workers 1 --out report",
+        " lq,turn-rate,los --engine local --workers 1 --out report",
         0,
     ),
     (

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from agents import PID, WheelOver
-from agents.verification.chain import build_autopilot, stage, with_standards
+from agents.verification.chain import build_autopilot, stage
 from agents.verification.refusal import lost_track
 from agents.verification.result import pilot_metrics, track_metrics
-from agents.verification.standards import heading_control
 from agents.verification.tracks import keep_track, track_task
 from agents.verification.tuned import holds_draws, model_task
 from agents.verification.verify import unique_keys
@@ -245,19 +244,6 @@ def test_what_is_wrong_is_said_before_a_file_is_read(given, message, tmp_path):
 
 def test_names_that_were_there_before_get_a_number():
     assert unique_keys(["lq", "pid", "lq", "lq"]) == ["lq", "pid", "lq-2", "lq-3"]
-
-
-def test_standards_are_those_of_the_best_design_and_the_tracks_that_are_given(chain):
-    """Without the best design the next one is asked; without a track rows are empty."""
-    found = chain[1].verification
-    ranked = [pilot for pilot in found.pilots if pilot.design is not None]
-    first = ranked[0].key
-    refused = {first: "it loses control", **{t.key: "late" for t in found.tracks}}
-    after = with_standards(replace(found, refused=refused), chain[1].model)
-    values = {row.name: row.value for row in after.standards}
-    assert values["cross_track"] is None
-    expected = heading_control(chain[1].model, ranked[1].design)
-    assert values["overshoot"] == expected["overshoot"]
 
 
 def test_a_search_leaves_models_drawn_that_a_design_loses():
