@@ -59,7 +59,6 @@ release-check: $(VENV)/dev-installed
 
 fuzz: $(VENV)/dev-installed
 	OMP_NUM_THREADS=1 $(BIN)/python scripts/fuzz.py
-	OMP_NUM_THREADS=1 $(BIN)/python scripts/fuzz.py --calls 6000
 
 ecosystem: $(VENV)/ecosystem-installed
 	OMP_NUM_THREADS=1 $(VENV)/ecosystem/bin/python scripts/ecosystem.py

@@ -10,7 +10,6 @@ from agents.controllers.controller_file import LEARNED, REMEDY, read_controller
 from shipgym import InputError, ShipModel
 from shipgym.checks import did_you_mean
 from shipgym.files import read_json
-from shipgym.wrong_types import typed
 
 if TYPE_CHECKING:
     from agents.policies.policy import LearnedPolicy
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
 PRETRAINED = Path(__file__).parent / "pretrained"
 
 
-@typed
 def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
     """Read the file of a controller or of a learned policy; neither needs torch.
 

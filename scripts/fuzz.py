@@ -4,7 +4,6 @@
     python scripts/fuzz.py --inputs 1000000             a million of each fast kind
     python scripts/fuzz.py --kind model --kind policy   some kinds
     python scripts/fuzz.py --time 600 --keep found      ten minutes; keep faulty files
-    python scripts/fuzz.py --calls 6000                 wrong types to public functions
 
 Each input is a sound file of `tests/corpus` with one to five changes to its structure
 or its bytes, which follow from `--seed`, the kind and the input's number alone. It is
@@ -32,7 +31,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from fuzzing.calls import faults
 from fuzzing.kinds import KINDS
 from fuzzing.processes import chunks, run
 from fuzzing.reading import Report
@@ -68,18 +66,8 @@ def main(
     keep: Annotated[
         Path | None, typer.Option(help="Folder for the files at fault.")
     ] = None,
-    calls: Annotated[
-        int | None,
-        typer.Option(help="Calls of public functions with wrong types, and no files."),
-    ] = None,
 ) -> None:
-    """Read mutated files of every kind, or call public functions with wrong types."""
-    if calls is not None:
-        found = list(faults(calls, seed))
-        for name, what in found:
-            print(f"{name}: {what[:300]}")
-        print(f"{len(found)} undocumented exceptions in {calls} calls")
-        raise typer.Exit(1 if found else 0)
+    """Read mutated files of every kind."""
     known = {one.name: one for one in KINDS}
     if unknown := [name for name in kind or () if name not in known]:
         raise typer.BadParameter(

@@ -23,7 +23,6 @@ from shipgym.envs.registration import check_named
 from shipgym.errors import InputError
 from shipgym.extras import library
 from shipgym.trials.trial import Trial
-from shipgym.wrong_types import typed
 
 if TYPE_CHECKING:
     from minari import MinariDataset
@@ -36,7 +35,6 @@ ATTRIBUTE = "shipgym"
 OF_STEPS = ("commands", "reward_parts", "rewards", "actions")
 
 
-@typed
 def to_frame(recorded: Trial | Episode) -> DataFrame:
     """Convert a trial or an episode to a pandas frame, with time in s as its index.
 
@@ -51,7 +49,6 @@ def to_frame(recorded: Trial | Episode) -> DataFrame:
     return frame
 
 
-@typed
 def from_frame(frame: DataFrame) -> Trial | Episode:
     """Convert a frame of `to_frame` back; the `raw` channels of a trial are lost.
 

@@ -46,7 +46,6 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_fields, check_format
 from shipgym.errors import InputError
 from shipgym.files import make_folder, read_json, write_json
-from shipgym.wrong_types import typed
 
 RESULTS, EPISODES, PARTS = "results.json", "episodes.parquet", "parts"
 PACKAGES = ("shipgym", "numpy", "numba", "scipy", "control")
@@ -293,7 +292,6 @@ def _about_entry(
     }
 
 
-@typed
 def load_results(path: str | Path, suite: Suite | None = None) -> BenchmarkResult:
     """Read the results of a benchmark.
 

@@ -17,14 +17,12 @@ from shipgym.checks import check_whole
 from shipgym.envs.engine import Engine
 from shipgym.ships.by_name import ship_of
 from shipgym.tasks.task import Task, course_keeping_task
-from shipgym.wrong_types import typed
 
 Observations = NDArray[np.float32]
 
 N_SHIPS = 3
 
 
-@typed
 def check_controller(
     controller: Policy,
     model: ShipModel | None = None,

@@ -24,7 +24,6 @@ from shipgym.checks import check_number
 from shipgym.engine.records import Record
 from shipgym.ships.by_name import takes_name
 from shipgym.tasks.task import Task
-from shipgym.wrong_types import typed
 
 # integral time over lookahead time with which s^2 + s / T + 1 / (T Ti) has a double
 # root
@@ -94,7 +93,6 @@ class LineOfSight(Guided):
 
     @classmethod
     @takes_name
-    @typed
     def from_model(
         cls,
         model: ShipModel,

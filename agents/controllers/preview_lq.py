@@ -38,7 +38,6 @@ from shipgym.checks import check_number
 from shipgym.engine.records import Record
 from shipgym.ships.by_name import takes_name
 from shipgym.tasks.task import Task
-from shipgym.wrong_types import typed
 
 
 class PreviewGains(NamedTuple):
@@ -355,7 +354,6 @@ class PreviewLQ(Guided):
 
     @classmethod
     @takes_name
-    @typed
     def from_model(
         cls,
         model: ShipModel,

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, TypeVar
 
 from shipgym.checks import check_choice
 from shipgym.errors import InputError
-from shipgym.wrong_types import typed
 
 if TYPE_CHECKING:
     from agents.controllers.controller import Controller
@@ -37,7 +36,6 @@ C = TypeVar("C", bound="Controller")
 _REGISTERED: dict[str, type[Controller]] = {}
 
 
-@typed
 def register_controller(controller: type[C]) -> type[C]:
     """Register a controller by its `kind`.
 
@@ -92,7 +90,6 @@ def _home(controller: type[Controller]) -> str:
     return f"{controller.__module__}:{controller.__qualname__}"
 
 
-@typed
 def controller_kinds() -> tuple[str, ...]:
     """Kinds of all controllers, those of users last."""
     return (*BUILT_IN, *_REGISTERED)

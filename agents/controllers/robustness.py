@@ -11,7 +11,6 @@ from agents.controllers.margins import Margins
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
 from shipgym.ships.by_name import ship_of
-from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +48,6 @@ class MarginUncertainty:
         return quantiles
 
 
-@typed
 def margin_uncertainty(
     controller: Controller, models: Sequence[ShipModel]
 ) -> MarginUncertainty:

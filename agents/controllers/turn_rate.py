@@ -25,7 +25,6 @@ from shipgym.checks import check_number
 from shipgym.engine.records import Record
 from shipgym.ships.by_name import takes_name
 from shipgym.ships.linear import Nomoto, linearise, nomoto_of, steady_turn_rudder
-from shipgym.wrong_types import typed
 
 GRID = np.arange(0.02, 0.81, 0.02)  # rates of the feed-forward, times length over speed
 # share of the rudder limit beyond which no steady turn is tabulated
@@ -128,7 +127,6 @@ class TurnRate(Controller):
 
     @classmethod
     @takes_name
-    @typed
     def from_model(
         cls,
         model: ShipModel,

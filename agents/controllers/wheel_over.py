@@ -32,7 +32,6 @@ from shipgym import ShipModel
 from shipgym.checks import check_number
 from shipgym.ships.by_name import takes_name
 from shipgym.tasks.task import Task
-from shipgym.wrong_types import typed
 
 SHORTEST_LEAD, LONGEST_LEAD = 0.1, 10.0  # ship lengths
 
@@ -91,7 +90,6 @@ class WheelOver(Guided):
 
     @classmethod
     @takes_name
-    @typed
     def from_model(
         cls,
         model: ShipModel,

@@ -20,7 +20,6 @@ from shipgym.envs.engine import Engine
 from shipgym.ships.by_name import ship_of
 from shipgym.tasks.scales import observation_scales
 from shipgym.tasks.task import Task, course_keeping_task
-from shipgym.wrong_types import typed
 
 RECORDED = ("psi", "delta", "set_point", *course_keeping_task().info_names)
 
@@ -82,7 +81,6 @@ class StepResponses(NamedTuple):
     rudder: Floats
 
 
-@typed
 def sail(
     controller: Policy,
     models: ShipModel | Sequence[ShipModel],
@@ -193,7 +191,6 @@ def _figures(run: Rollout) -> dict[str, NDArray[np.generic]]:
     }
 
 
-@typed
 def step_response(
     controller: Policy,
     models: ShipModel | Sequence[ShipModel],

@@ -13,7 +13,6 @@ from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats
 from shipgym.envs.engine import Engine, episode_keys
 from shipgym.tasks.task import Task
-from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +68,6 @@ class Rollout:
         return np.asarray(self.sailing.sum(axis=0, dtype=np.float64))
 
 
-@typed
 def rollout(
     policy: Policy,
     engine: Engine,

@@ -33,7 +33,6 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_choice
 from shipgym.manoeuvres import prbs_rudder, turning_circle, zigzag
 from shipgym.ships.by_name import takes_name
-from shipgym.wrong_types import typed
 
 #: Simulates a manoeuvre with a model.
 Candidate = Callable[[ShipModel], Trial]
@@ -197,7 +196,6 @@ def check_criterion(criterion: str, coefficient: str | None) -> None:
 
 
 @takes_name
-@typed
 def advise(
     model: ShipModel,
     trials: Sequence[Trial],

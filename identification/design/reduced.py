@@ -19,7 +19,6 @@ from shipgym.arrays import finite
 from shipgym.checks import check_choice
 from shipgym.ships import GreyBox, Structure, get_structure
 from shipgym.ships.structures import GREY_BOX
-from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +75,6 @@ def _plain_path(reduction: Reduction) -> list[dict[str, Any]]:
     return path
 
 
-@typed
 def identify_reduced(
     trials: Sequence[Trial],
     direction: str = "backward",

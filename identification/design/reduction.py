@@ -26,7 +26,6 @@ from identification.text import as_text
 from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
-from shipgym.wrong_types import typed
 
 FOLDS = 5
 
@@ -143,7 +142,6 @@ def _relative_errors(estimator: TruncatedLSSVM) -> Floats:
     return errors
 
 
-@typed
 def backward_elimination(
     X: ArrayLike,
     y: ArrayLike,
@@ -243,7 +241,6 @@ def collinear_terms(features: Floats, kept: Sequence[int]) -> set[int]:
     return {kept[place] for place in places}
 
 
-@typed
 def forward_selection(
     X: ArrayLike,
     y: ArrayLike,

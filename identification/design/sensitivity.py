@@ -13,7 +13,6 @@ from shipgym.checks import check_number
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import Structure
 from shipgym.ships.by_name import takes_name
-from shipgym.wrong_types import typed
 
 
 def table_of(model: ShipModel) -> Structure:
@@ -27,7 +26,6 @@ def table_of(model: ShipModel) -> Structure:
 
 
 @takes_name
-@typed
 def sensitivity(
     model: ShipModel, manoeuvre: Callable[[ShipModel], Trial], change: float = 0.01
 ) -> dict[str, float]:

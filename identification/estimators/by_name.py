@@ -14,7 +14,6 @@ from identification.estimators.optimisers import (
 from identification.estimators.search import Objective, Optimiser, SearchResult
 from shipgym import InputError
 from shipgym.checks import check_choice
-from shipgym.wrong_types import typed
 
 OPTIMISERS: dict[str, type[Optimiser]] = {
     "abc": ArtificialBeeColony,
@@ -40,7 +39,6 @@ def get_optimiser(optimiser: str | Mapping[str, Any] | Optimiser) -> Optimiser:
         ) from None
 
 
-@typed
 def minimise(
     objective: Objective,
     bounds: ArrayLike,

@@ -14,7 +14,6 @@ from shipgym import InputError, Particulars, Trial
 from shipgym.arrays import Floats, Integers
 from shipgym.checks import check_choice
 from shipgym.ships import Structure, get_structure
-from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +48,6 @@ class CoefficientHistory:
         return dict(zip(self.names, self.values[-1].tolist(), strict=True))
 
 
-@typed
 def coefficient_history(
     source: Samples | Trial | Sequence[Trial],
     structure: str | Structure,

@@ -10,10 +10,8 @@ from sklearn.utils.validation import check_is_fitted
 from identification.estimators.lssvm import LSSVM
 from shipgym import InputError
 from shipgym.arrays import Floats
-from shipgym.wrong_types import typed
 
 
-@typed
 def polynomial_coefficients(estimator: LSSVM) -> dict[tuple[int, ...], float]:
     """Coefficients of a fitted LS-SVM with polynomial kernel (Zhu 2018, eq. 5.5-5.7).
 

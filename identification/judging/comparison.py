@@ -36,7 +36,6 @@ from shipgym.checks import check_number
 from shipgym.files import write_json, write_text
 from shipgym.ships import Structure
 from shipgym.ships.structures import GREY_BOX, MMG
-from shipgym.wrong_types import typed
 
 #: Compared where none are named; for a grey box also RM-SVM.
 USUAL = (
@@ -90,7 +89,6 @@ class Comparison(Ranking):
         return models
 
 
-@typed
 def compare_methods(
     trials: Sequence[Trial],
     methods: Sequence[Any] | None = None,
@@ -243,7 +241,6 @@ def _each_in_turn(
     return cross_validate(trials, **{**others, **own})
 
 
-@typed
 def cross_validate(
     trials: Sequence[Trial], folds: int | None = None, **arguments: Any
 ) -> dict[str, Any]:

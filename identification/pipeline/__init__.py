@@ -17,11 +17,9 @@ from identification.samples.samples import Sampling
 from shipgym import ShipModel, SteeringGear, Trial
 from shipgym.ships import Structure
 from shipgym.ships.structures import MMG
-from shipgym.wrong_types import typed
 
 
 @single_threaded()
-@typed
 def identify(
     trials: Sequence[Trial],
     structure: str | Structure = "abkowitz",

@@ -22,7 +22,6 @@ from shipgym.checks import check_choice
 from shipgym.manoeuvres.towing_tank import rigid_body_forces
 from shipgym.ships import Term, get_structure
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
-from shipgym.wrong_types import typed
 
 FORCES = ("X", "Y", "N")
 FEWEST = 4  # samples between jumps
@@ -79,7 +78,6 @@ class ForceRegression:
         return shares
 
 
-@typed
 def force_regression(
     trials: Sequence[Trial],
     structure: SharedStructure,
@@ -297,7 +295,6 @@ def force_variances(equation: Integers, residuals: Floats, leverages: Floats) ->
 
 
 @single_threaded()
-@typed
 def identify_forces(
     trials: Sequence[Trial],
     structure: str = "pmm18",

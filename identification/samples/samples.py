@@ -34,7 +34,6 @@ from shipgym.arrays import Floats, Integers, integral
 from shipgym.checks import check_choice, check_whole
 from shipgym.ships import GreyBox, Structure
 from shipgym.trials.resampling import usual_step
-from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True)
@@ -109,7 +108,6 @@ class Samples:
         )
 
 
-@typed
 def build_samples(
     trials: Sequence[Trial],
     structure: Structure,

@@ -10,7 +10,6 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 
 from shipgym.arrays import Flags
 from shipgym.errors import InputError
-from shipgym.wrong_types import typed
 
 Vectors = VectorEnv[Any, Any, Any]
 Make = Callable[[], Vectors]
@@ -21,7 +20,6 @@ SEED = 1234
 STEPS = 200
 
 
-@typed
 def check_vector_env(
     make: Make,
     make_single: MakeSingle | None = None,

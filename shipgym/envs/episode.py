@@ -26,7 +26,6 @@ from shipgym.tasks.guidance import Path as PlannedPath
 from shipgym.tasks.guidance import track
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
-from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,7 +219,6 @@ class Episode:
         write_json(to_file(vars(self)), Path(path), indent=None)
 
     @classmethod
-    @typed
     def load(cls, path: str | Path) -> Self:
         """Read an episode that was saved; its numbers are the very same.
 

@@ -8,7 +8,6 @@ import gymnasium
 
 from shipgym.checks import check_choice, check_text, data_only
 from shipgym.errors import InputError
-from shipgym.wrong_types import typed
 
 ENTRY_POINT = "shipgym.envs.ship_env:ShipEnv"  # of every environment
 #: Keywords of each environment by its id.
@@ -63,7 +62,6 @@ def register_environments() -> None:
         _register(name, options)
 
 
-@typed
 def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     """Register a task of your own, so that `gym.make` and `gym.make_vec` know it.
 

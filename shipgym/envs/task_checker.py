@@ -20,7 +20,6 @@ from shipgym.python_files import asked, place_of
 from shipgym.sea.current_field import function_of_file
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
-from shipgym.wrong_types import typed
 
 STEPS = 400
 PLAIN_STEPS = 40  # in plain Python
@@ -32,7 +31,6 @@ class TaskCheck(Findings):
     """Result of checking a task; its name is that of the task, or its file."""
 
 
-@typed
 def check_task(task: Any, **options: Any) -> TaskCheck:
     """Check a task for errors.
 

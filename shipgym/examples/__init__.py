@@ -3,10 +3,8 @@
 from pathlib import Path
 
 from shipgym.checks import check_choice
-from shipgym.wrong_types import typed
 
 
-@typed
 def example_ship(name: str = "mariner") -> Path:
     """Path of a ship file with trials that comes with the package.
 

@@ -15,11 +15,9 @@ from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Seed, orders, simulate
 from shipgym.trials.trial import Trial
-from shipgym.wrong_types import typed
 
 
 @takes_name
-@typed
 def prbs_rudder(
     model: ShipModel,
     amplitude_deg: float = 10.0,
@@ -84,7 +82,6 @@ def prbs_rudder(
 
 
 @takes_name
-@typed
 def multi_sine_rudder(
     model: ShipModel,
     amplitude_deg: float = 10.0,
@@ -156,7 +153,6 @@ def _least_crest(harmonics: Floats, turns: Floats, seed: Seed) -> Floats:
 
 
 @takes_name
-@typed
 def random_rudder_steps(
     model: ShipModel,
     largest_deg: float = 20.0,
@@ -191,7 +187,6 @@ def random_rudder_steps(
 
 
 @takes_name
-@typed
 def shaft_speed_steps(
     model: ShipModel,
     lowest_ratio: float = 0.5,

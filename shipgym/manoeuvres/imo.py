@@ -20,13 +20,11 @@ from shipgym.manoeuvres.verdicts import (
 )
 from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
-from shipgym.wrong_types import typed
 
 DRAWS = 100  # of an identified ship
 
 
 @takes_name
-@typed
 def imo_assessment(
     model: ShipModel, n_draws: int | None = None, seed: int | np.random.Generator = 0
 ) -> dict[str, Criterion]:

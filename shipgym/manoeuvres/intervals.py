@@ -14,7 +14,6 @@ from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.standard import standard_manoeuvres
 from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
-from shipgym.wrong_types import typed
 
 #: From a ship to the indices of one of her manoeuvres, a dataclass such as
 #: `ZigzagIndices`.
@@ -123,7 +122,6 @@ class IndexInterval:
 
 
 @takes_name
-@typed
 def index_intervals(
     model: ShipModel,
     manoeuvre: str | Evaluation = "zigzag 20/20, starboard first",

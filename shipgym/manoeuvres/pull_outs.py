@@ -18,7 +18,6 @@ from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.trial import Trial
-from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,6 @@ class PullOutIndices:
 
 
 @takes_name
-@typed
 def pull_out(
     model: ShipModel,
     rudder_deg: float = 20.0,
@@ -60,7 +58,6 @@ def pull_out(
     return voyage.trial("pull-out")
 
 
-@typed
 def pull_out_indices(trial: Trial) -> PullOutIndices:
     """Yaw rate of the turn and the yaw rate left at the end of a pull-out.
 

@@ -13,7 +13,6 @@ from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import KINDS, Trial
-from shipgym.wrong_types import typed
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -92,7 +91,6 @@ class Family:
 FAMILIES: dict[str, Family] = {}
 
 
-@typed
 def register_manoeuvre(
     name: str, variants: Variants, title: str = "", kind: str | None = None
 ) -> None:
@@ -139,7 +137,6 @@ def families_of(
 
 
 @takes_name
-@typed
 def standard_manoeuvres(
     model: ShipModel, water_depth: float = np.inf
 ) -> dict[str, Manoeuvre]:

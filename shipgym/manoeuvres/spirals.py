@@ -25,7 +25,6 @@ from shipgym.ships.linear import is_course_stable
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.trial import Trial
-from shipgym.wrong_types import typed
 
 SpiralMethod = Literal["direct", "reverse"]
 
@@ -84,7 +83,6 @@ class _Curve(NamedTuple):
 
 
 @takes_name
-@typed
 def direct_spiral(
     model: ShipModel,
     rudder_deg: Sequence[float] = DIRECT_RUDDER_DEG,
@@ -120,7 +118,6 @@ def direct_spiral(
 
 
 @takes_name
-@typed
 def reverse_spiral(
     model: ShipModel,
     yaw_rate_deg_s: Sequence[float] | None = None,
@@ -198,7 +195,6 @@ def one_way(
     return numbers
 
 
-@typed
 def spiral_from_trial(
     trial: Trial, rudder_deg: Sequence[float] | None = None, tolerance_deg: float = 0.5
 ) -> Spiral:
@@ -266,7 +262,6 @@ def _near(angle: float, wanted: Sequence[float], tolerance: float) -> bool:
     return any(abs(angle - other) <= tolerance for other in wanted)
 
 
-@typed
 def spiral_indices(spiral: Spiral) -> SpiralIndices:
     """Width and height of the loop of a spiral, simulated or from a trial.
 

@@ -18,7 +18,6 @@ from shipgym.ships.by_name import takes_name
 from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
-from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True)
@@ -132,7 +131,6 @@ def goes_astern(model: ShipModel) -> bool:
 
 
 @takes_name
-@typed
 def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:
     """Full astern stopping test: the shaft astern as fast as ahead, until at rest.
 
@@ -142,7 +140,6 @@ def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:
     return stopping(model, -shaft_of(model), speed_ratio=0.0, water_depth=water_depth)
 
 
-@typed
 def stopping_indices(
     trial: Trial, speed_ratio: float | None = None, length: float | None = None
 ) -> StoppingIndices:
@@ -181,7 +178,6 @@ def stopping_indices(
 
 
 @takes_name
-@typed
 def acceleration(
     model: ShipModel,
     start_ratio: float = 0.25,
@@ -220,7 +216,6 @@ def acceleration(
     return voyage.trial("straight")
 
 
-@typed
 def acceleration_indices(
     trial: Trial, part: float = 0.9, length: float | None = None
 ) -> AccelerationIndices:

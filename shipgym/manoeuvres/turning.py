@@ -22,7 +22,6 @@ from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Seed, orders, simulate
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
-from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,6 @@ class _SteadyTurn(NamedTuple):
 
 
 @takes_name
-@typed
 def turning_circle(
     model: ShipModel,
     rudder_deg: float = 35.0,
@@ -93,7 +91,6 @@ def turning_circle(
     )
 
 
-@typed
 def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices:
     """Advance, transfer, diameters and the steady turn of a turning circle.
 

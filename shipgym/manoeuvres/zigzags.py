@@ -25,7 +25,6 @@ from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Conditions, Passage, Seed, as_trial, orders
 from shipgym.trials.trial import Trial
-from shipgym.wrong_types import typed
 
 STANDARD_DEG = (10.0, 20.0)
 
@@ -44,7 +43,6 @@ class ZigzagIndices:
 
 
 @takes_name
-@typed
 def zigzag(
     model: ShipModel,
     rudder_deg: float = 20.0,
@@ -129,7 +127,6 @@ def _refuse_without_reversal(
     )
 
 
-@typed
 def zigzag_indices(
     trial: Trial, length: float | None = None, heading_deg: float | None = None
 ) -> ZigzagIndices:
@@ -177,7 +174,6 @@ def _initial_turning(
     return float(then - before) / length
 
 
-@typed
 def switch_heading_deg(trial: Trial) -> float | None:
     """Heading change at which the rudder was to be reversed, degrees; None if never.
 

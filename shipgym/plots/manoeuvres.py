@@ -36,10 +36,8 @@ from shipgym.plots.style import (
 )
 from shipgym.plots.trials import CHANNEL_AXES, history_figure, quantity, thinned
 from shipgym.trials.trial import Trial
-from shipgym.wrong_types import typed
 
 
-@typed
 def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
     """Plot a zigzag: heading change and rudder over time, with the switch headings.
 
@@ -73,7 +71,6 @@ def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
     return panels([panel], height)
 
 
-@typed
 def turning_figure(
     trial: Trial, length: float | None = None, height: int = 480
 ) -> Figure:
@@ -135,7 +132,6 @@ def _dimension(x: list[float], y: list[float], name: str, colour: str) -> Any:
     )
 
 
-@typed
 def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
     """Plot yaw rate over rudder angle of a spiral; a direct one in two lines."""
     angles = spiral.rudder_deg
@@ -191,7 +187,6 @@ def _loop_line(indices: SpiralIndices) -> Any:
     )
 
 
-@typed
 def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
     """Plot yaw rates of pull-outs since the rudder went amidships.
 
@@ -228,7 +223,6 @@ def _release(trial: Trial) -> float:
     return float(trial.t[laid[-1] + 1])
 
 
-@typed
 def speed_figure(
     trial: Trial, length: float | None = None, height: int = 380
 ) -> Figure:
@@ -269,7 +263,6 @@ def speed_figure(
     )
 
 
-@typed
 def excitation_figure(trial: Trial) -> Figure:
     """Plot a manoeuvre for identification: orders above the ship's response."""
     shown = []
@@ -282,7 +275,6 @@ def excitation_figure(trial: Trial) -> Figure:
     return figure
 
 
-@typed
 def manoeuvre_figure(sailed: Trial | Spiral) -> Figure:
     """Plot a manoeuvre in the form of its kind; else time histories.
 

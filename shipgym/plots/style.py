@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipgym.extras import library
-from shipgym.wrong_types import typed
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure as Figure
@@ -35,7 +34,6 @@ def _plotly(module: str) -> Any:
     return library(f"plotly.{module}", "report", "figures and reports need it")
 
 
-@typed
 def subplots(
     rows: int, columns: int, titles: Sequence[str] = (), **settings: Any
 ) -> Figure:
@@ -210,13 +208,11 @@ def axis(title: str = "", zero: bool = False, **changes: Any) -> dict[str, Any]:
     return shared | changes
 
 
-@typed
 def compact(values: ArrayLike) -> NDArray[np.float32]:
     """Values in single precision: half the size in a file, and finer than a pixel."""
     return np.asarray(values, dtype=np.float32)
 
 
-@typed
 def line_styles(labels: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Line of each label: measurements thin and dark, others by the palette."""
     styles: dict[str, dict[str, Any]] = {}
@@ -229,14 +225,12 @@ def line_styles(labels: Iterable[str]) -> dict[str, dict[str, Any]]:
     return styles
 
 
-@typed
 def translucent(colour: str, opacity: float) -> str:
     """A colour "#rrggbb" with an opacity, as CSS knows it."""
     red, green, blue = bytes.fromhex(colour.removeprefix("#"))
     return f"rgba({red},{green},{blue},{opacity})"
 
 
-@typed
 def line(
     x: ArrayLike,
     y: ArrayLike,
@@ -258,7 +252,6 @@ def line(
     )
 
 
-@typed
 def points(
     x: ArrayLike, y: ArrayLike, name: str, colour: str, size: float = 7.0, **more: Any
 ) -> Any:

@@ -10,7 +10,6 @@ from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.plots.style import Figure, Panel, axis, line, line_styles, panels
 from shipgym.trials.trial import Trial
-from shipgym.wrong_types import typed
 
 
 class ChannelAxis(NamedTuple):
@@ -69,7 +68,6 @@ def thinned(trial: Trial) -> slice:
     return slice(None, None, step)
 
 
-@typed
 def history_figure(
     trials: Mapping[str, Trial],
     channels: Sequence[str] = ("psi", "r", "u", "v", "delta"),
@@ -113,7 +111,6 @@ def _history(trials: Mapping[str, Trial], channel: str) -> Panel:
     return Panel(lines, "time, s", title)
 
 
-@typed
 def path_figure(trials: Mapping[str, Trial], height: int = 460) -> Figure:
     """Plot paths seen from above, north up, to one scale, by the label of their line.
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from shipgym.checks import check_table, check_text
 from shipgym.errors import InputError
-from shipgym.wrong_types import typed
 
 if TYPE_CHECKING:
     from shipgym.sea.current_field import CurrentField
@@ -82,7 +81,6 @@ class Weather:
         return {"name": self.name, **asdict(self)}
 
     @classmethod
-    @typed
     def from_dict(cls, mapping: Mapping[str, Any], where: str = "weather") -> Weather:
         """Read what :meth:`to_dict` wrote; absent parts are off.
 

@@ -27,7 +27,6 @@ from shipgym.sea.waves import (
     wave_spectrum,
 )
 from shipgym.ships.particulars import Particulars
-from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,6 @@ class WaveDrift:
         )
 
 
-@typed
 def wave_drift(
     waves: Waves, particulars: Particulars, speed: float | None = None
 ) -> WaveDrift:

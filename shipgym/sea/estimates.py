@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Estimates, Particulars, with_estimates
-from shipgym.wrong_types import typed
 
 
 class Hull(NamedTuple):
@@ -27,7 +26,6 @@ def hull_of(ship: Particulars) -> Hull:
     )
 
 
-@typed
 def weather_particulars(particulars: Particulars) -> Particulars:
     """Return particulars with all that the weather needs.
 

@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 from shipgym.sea.current_wind_waves import Wind
-from shipgym.wrong_types import typed
 
 #: Surface drag coefficient of Harris's and Davenport's spectra for a rough sea.
 SURFACE_DRAG = 0.003
@@ -38,7 +37,6 @@ class GaussMarkov(NamedTuple):
         return 4.0 * variance * T / (1.0 + (omega * T) ** 2)
 
 
-@typed
 def gust_spectrum(
     frequency: ArrayLike, speed: float, spectrum: str = "harris"
 ) -> Floats:
@@ -80,7 +78,6 @@ def froya_frequencies(number: int) -> Floats:
     return np.geomspace(1.0 / 2400.0, 0.5, number)
 
 
-@typed
 def gust_variance(speed: float, spectrum: str = "harris") -> float:
     """Variance of the wind speed, the integral of :func:`gust_spectrum`, (m/s)^2.
 
@@ -95,7 +92,6 @@ def gust_variance(speed: float, spectrum: str = "harris") -> float:
     return factor * SURFACE_DRAG * speed**2
 
 
-@typed
 def gust_filter(wind: Wind) -> GaussMarkov:
     """First-order process with the gusts' variance and most energetic frequency.
 

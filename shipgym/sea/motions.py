@@ -18,7 +18,6 @@ from shipgym.sea.waves import (
     wave_spectrum,
 )
 from shipgym.ships.particulars import Particulars
-from shipgym.wrong_types import typed
 
 
 def heading_response(
@@ -102,7 +101,6 @@ class WaveMotion:
         return cosine_coefficients(self.roll_variance, n)
 
 
-@typed
 def wave_motion(
     waves: Waves, particulars: Particulars, speed: float | None = None
 ) -> WaveMotion:

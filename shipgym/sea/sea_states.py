@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
-from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True)
@@ -22,7 +21,6 @@ class SeaState:
     wind_speed: float  # 10 m above the sea, m/s
 
 
-@typed
 def sea_states() -> dict[str, SeaState]:
     """Sea states by name, from calm to rough.
 

@@ -15,7 +15,6 @@ from shipgym.sea.estimates import weather_particulars
 from shipgym.sea.gusts import GaussMarkov
 from shipgym.sea.harmonics import circle
 from shipgym.ships.particulars import Particulars
-from shipgym.wrong_types import typed
 
 
 class WaveFilter(NamedTuple):
@@ -40,7 +39,6 @@ class WaveFilter(NamedTuple):
         return response / pi
 
 
-@typed
 def pierson_moskowitz(omega: ArrayLike, Hs: float, Tp: float) -> Floats:
     """Spectrum of a fully developed sea (Pierson & Moskowitz 1964) by Hs, m, and Tp, s.
 
@@ -57,7 +55,6 @@ def pierson_moskowitz(omega: ArrayLike, Hs: float, Tp: float) -> Floats:
     return density
 
 
-@typed
 def jonswap(omega: ArrayLike, Hs: float, Tp: float, gamma: float = 3.3) -> Floats:
     """Spectrum of a growing sea (Hasselmann et al. 1973), normalised to Hs.
 
@@ -89,7 +86,6 @@ def _enhanced_variance(gamma: float) -> float:
     return float(enhanced_variance / variance)
 
 
-@typed
 def wave_spectrum(waves: Waves, omega: ArrayLike) -> Floats:
     """Spectrum of the elevation of a sea, m2 s/rad."""
     return jonswap(omega, waves.significant_height, waves.peak_period, waves.gamma)
@@ -122,7 +118,6 @@ def over_directions(curve: Floats, waves: Waves) -> Floats:
     return irfft(convolution, n=n)
 
 
-@typed
 def encounter_frequency(omega: ArrayLike, speed: ArrayLike, chi: ArrayLike) -> Floats:
     """Frequency of encounter in deep water: |omega + omega^2 U cos(chi) / g|, rad/s.
 
@@ -135,7 +130,6 @@ def encounter_frequency(omega: ArrayLike, speed: ArrayLike, chi: ArrayLike) -> F
     return met
 
 
-@typed
 def wave_filter(waves: Waves) -> WaveFilter:
     """Second-order filter with the shape of the wave spectrum and unit variance.
 
@@ -182,7 +176,6 @@ def draught_attenuation(omega: ArrayLike, draught: float) -> Floats:
     return 1.0 / (1.0 + ratio**2)
 
 
-@typed
 def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:
     """Process s(t) of the slowly varying drift force, mean force * (1 + s).
 

@@ -22,7 +22,6 @@ from shipgym.sea.wind_coefficients import (
     isherwood_coefficients,
 )
 from shipgym.ships.particulars import Particulars
-from shipgym.wrong_types import typed
 
 #: At 15 degrees Celsius and sea level, kg/m3 (ISO 2533 standard atmosphere).
 AIR_DENSITY = 1.225
@@ -65,7 +64,6 @@ class WindCurves:
         )
 
 
-@typed
 def wind_curves(
     particulars: Particulars, coefficients: str | WindTable = "blendermann"
 ) -> WindCurves:

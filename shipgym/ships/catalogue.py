@@ -16,7 +16,6 @@ from shipgym.ships.structures import (
     list_equations,
     list_structures,
 )
-from shipgym.wrong_types import typed
 
 if TYPE_CHECKING:  # imported with the ships that need them
     from shipgym.ships.equations import ShipEquations
@@ -111,14 +110,12 @@ REFERENCE_SHIPS: dict[str, Callable[[], ShipModel]] = {
 # ---- by name or file -----------------------------------------------------------------
 
 
-@typed
 def list_models() -> list[str]:
     """Names of the known models: reference ships, identified and registered ones."""
     identified = sorted(path.stem for path in LIBRARY.glob("*.json"))
     return [*REFERENCE_SHIPS, *identified, *REGISTERED_EQUATIONS]
 
 
-@typed
 def register_ship_equations(ship: ShipEquations | str | Path) -> ShipEquations:
     """Register a ship with its own equations, so that `load_model` finds it by name.
 
@@ -146,7 +143,6 @@ def register_ship_equations(ship: ShipEquations | str | Path) -> ShipEquations:
     return new
 
 
-@typed
 def load_model(name: str | Path) -> ShipModel:
     """Load a model by name, or from a file.
 
@@ -176,7 +172,6 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-@typed
 def truth_of(model: str | Path | ShipModel) -> ShipModel:
     """The reference ship whose simulated trials an identified model comes from.
 
@@ -209,7 +204,6 @@ def truth_of(model: str | Path | ShipModel) -> ShipModel:
 # ---- grey boxes ----------------------------------------------------------------------
 
 
-@typed
 def grey_box(
     reference: str | ShipModel,
     equations: Mapping[str, str | tuple[Term, ...]] | None = None,
@@ -256,7 +250,6 @@ def fitted_box(ship: ShipModel) -> GreyBox:
     return replace(grey_box(ship), reference=reference)
 
 
-@typed
 def converted_model(
     reference: str | ShipModel | GreyBox,
     particulars: Particulars,

@@ -17,7 +17,6 @@ from shipgym.ships.simulate import orders
 from shipgym.ships.term_checks import EQUATION_NAMES
 from shipgym.ships.term_table import ANGULAR, Structure
 from shipgym.trials.trial import Trial
-from shipgym.wrong_types import typed
 
 STRAIGHT_LENGTHS = 30.0  # ship lengths of a run
 
@@ -40,7 +39,6 @@ class ModelCheck(Findings):
         )
 
 
-@typed
 def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
     """Check a model for errors.
 

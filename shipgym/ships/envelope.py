@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_array, check_table, unexpected
-from shipgym.wrong_types import typed
 
 ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
 
@@ -73,7 +72,6 @@ class Envelope:
         }
 
     @classmethod
-    @typed
     def from_dict(cls, content: Any, where: str) -> Self:
         """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
         shapes = {

@@ -17,7 +17,6 @@ from shipgym.errors import InputError
 from shipgym.ships.by_name import takes_name
 from shipgym.ships.inertia import inertia
 from shipgym.ships.ship_model import ShipModel
-from shipgym.wrong_types import typed
 
 #: Largest neutral rudder, rad: beyond, a model is not that of a ship.
 LARGEST_RUDDER = np.radians(20.0)
@@ -378,7 +377,6 @@ class StraightLineStability:
 
 
 @takes_name
-@typed
 def straight_line_stability(model: ShipModel) -> StraightLineStability:
     """Straight-line stability with rudder, speed and shaft fixed and roll balanced.
 

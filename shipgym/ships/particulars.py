@@ -13,7 +13,6 @@ from shipgym.constants import SEA_WATER
 from shipgym.errors import InputError
 from shipgym.ships.particulars_limits import ADDED_MASSES as ADDED_MASSES
 from shipgym.ships.particulars_limits import LIMITS, check_together, check_value
-from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,6 @@ class Particulars(Mapping[str, Any]):
         return len(NAMES)
 
     @classmethod
-    @typed
     def from_mapping(
         cls, mapping: Mapping[str, Any], where: str = "particulars"
     ) -> Self:

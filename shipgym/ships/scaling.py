@@ -13,11 +13,9 @@ from shipgym.ships.particulars import Particulars
 from shipgym.ships.particulars_limits import LIMITS
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.term_table import Structure
-from shipgym.wrong_types import typed
 
 
 @takes_name
-@typed
 def scale_model(
     model: ShipModel,
     length: float,

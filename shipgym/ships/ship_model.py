@@ -16,7 +16,6 @@ from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.model_file import numbers_hash, read_model
-from shipgym.wrong_types import typed
 
 if TYPE_CHECKING:  # for annotations, and where a ship is simulated
     from shipgym.sea.conditions import Weather
@@ -162,7 +161,6 @@ class ShipModel(ManoeuvringModel):
         write_json({**self.to_dict(), "sha256": numbers_hash(self)}, Path(path))
 
     @classmethod
-    @typed
     def load(cls, path: str | Path) -> Self:
         """Read a model file; InputError, naming the file and the field at fault."""
         file = Path(path)
@@ -171,7 +169,6 @@ class ShipModel(ManoeuvringModel):
         return cls.from_dict(fields, str(file))
 
     @classmethod
-    @typed
     def from_dict(cls, fields: Mapping[str, Any], where: str = "model") -> Self:
         """Read what `to_dict` gave, or a model file holds.
 

@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, Self
 
 from shipgym.checks import check_number, check_table, placed
-from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,6 @@ class SteeringGear:
             object.__setattr__(self, name, number)
 
     @classmethod
-    @typed
     def from_mapping(
         cls, mapping: Mapping[str, Any], where: str = "steering gear"
     ) -> Self:

@@ -12,7 +12,6 @@ from shipgym.errors import InputError
 from shipgym.files import shipped_toml
 from shipgym.ships.term_table import Structure
 from shipgym.ships.terms import Term, read_terms, short_terms
-from shipgym.wrong_types import typed
 
 if TYPE_CHECKING:  # few models have equations
     from shipgym.ships.equations import ShipEquations
@@ -86,13 +85,11 @@ def _by_axis(texts: Mapping[str, str], read: Callable[[str], Read]) -> dict[str,
 # ---- by name -------------------------------------------------------------------------
 
 
-@typed
 def list_structures() -> list[str]:
     """Names of the structures that can be identified, registered ones included."""
     return [*printed_tables(), *REGISTERED_STRUCTURES, *NO_TABLES]
 
 
-@typed
 def get_structure(name: str) -> Structure:
     """Return an identified structure by name.
 

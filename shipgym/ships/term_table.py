@@ -36,7 +36,6 @@ from shipgym.ships.terms import (
     read_term_list,
     symbols_in,
 )
-from shipgym.wrong_types import typed
 
 FORCE_OF_EQUATION = {"u": "X", "v": "Y", "r": "N"}
 ANGULAR = ("r", "p", "q")  # of these the unit holds 1 / length once more
@@ -429,7 +428,6 @@ class Structure:
         return table
 
     @classmethod
-    @typed
     def from_dict(cls, table: Mapping[str, Any], where: str = "structure") -> Self:
         """Read what `to_dict` wrote; errors begin with `where`."""
         return cls(**structure_fields(table, where))

@@ -15,7 +15,6 @@ from shipgym.checks import (
     unexpected,
 )
 from shipgym.errors import InputError
-from shipgym.wrong_types import typed
 
 # du is the surge speed above service speed, dn the shaft speed above that of service, U
 # the speed through the water, p the roll rate and phi the heel; bars stand for absolute
@@ -110,7 +109,6 @@ class Term:
         return {"name": self.name, "powers": dict(self.powers)}
 
     @classmethod
-    @typed
     def from_dict(cls, content: Any, where: str) -> Self:
         """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
         fields = ("name", "powers")

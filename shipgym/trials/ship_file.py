@@ -18,7 +18,6 @@ from shipgym.trials.trial import USES, Trial, cut_trials, trial_of
 from shipgym.trials.trial_entries import TrialEntry, read_entries
 from shipgym.trials.trial_import import import_tables
 from shipgym.trials.undecided import take_undecided
-from shipgym.wrong_types import typed
 
 _SECTIONS = (
     "ship",
@@ -66,7 +65,6 @@ class ShipFile:
     undecided: tuple[str, ...] = ()
 
     @classmethod
-    @typed
     def load(cls, path: str | Path) -> Self:
         """Read and check a ship file; its logs must exist, :meth:`trials` reads them.
 

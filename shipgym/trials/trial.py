@@ -34,7 +34,6 @@ from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.resampling import FEWEST_SAMPLES, Log
 from shipgym.trials.trial_import import import_tables
 from shipgym.trials.units import CHANNELS, check_channel
-from shipgym.wrong_types import typed
 
 #: Kinds of manoeuvre that a trial may name; `shipgym.manoeuvres.register_manoeuvre`
 #: adds a user's own.
@@ -112,7 +111,6 @@ class Trial:
     notes: tuple[str, ...]
     magnetic: bool
 
-    @typed
     def __init__(
         self,
         t: npt.ArrayLike,
@@ -289,7 +287,6 @@ class Trial:
         )
 
     @classmethod
-    @typed
     def from_csv(
         cls,
         path: str | Path | LogTable,
