@@ -2,9 +2,7 @@
 # make test      everything that is checked: format, lint, types, tests
 # make bench     how fast it is
 # make fuzz      a million mutated files of every kind that is read
-# make soak      long runs with extreme actions, kills at random moments, wrong command lines
 # make release-check  the wheel in clean environments, without extras and with each, lowest and newest versions
-# make ecosystem skrl, TorchRL, Tianshou and CleanRL's wrappers on our environments; for every night
 # make evidence  what the pages of docs/ claim, run again
 # make docs      the site, and whether its links, pictures and pages work in a browser
 # make site-test the latter alone
@@ -19,7 +17,7 @@ DATA ?= ../shared/data
 # Bytecode is kept (an empty value means unset): the many processes of the tests compile the same files but once.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo test lint format type bench soak fuzz release-check ecosystem evidence docs site-test clean
+.PHONY: demo test lint format type bench fuzz release-check evidence docs site-test clean
 
 demo: $(VENV)/demo-installed
 	$(BIN)/shipgym autopilot examples/mariner/ship.toml --out report
@@ -49,19 +47,11 @@ type: $(VENV)/dev-installed
 bench: $(VENV)/dev-installed
 	OMP_NUM_THREADS=1 $(BIN)/python scripts/benchmark_speed.py
 
-soak: $(VENV)/dev-installed
-	$(BIN)/python scripts/soak.py
-	$(BIN)/python scripts/soak_kills.py
-	$(BIN)/python scripts/wrong_commands.py
-
 release-check: $(VENV)/dev-installed
 	$(BIN)/python scripts/release_check.py
 
 fuzz: $(VENV)/dev-installed
 	OMP_NUM_THREADS=1 $(BIN)/python scripts/fuzz.py
-
-ecosystem: $(VENV)/ecosystem-installed
-	OMP_NUM_THREADS=1 $(VENV)/ecosystem/bin/python scripts/ecosystem.py
 
 evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/reproduce.py all --markdown docs/reproduction.md --images docs/images || test $$? = 1  # 1: aims missed, as the page says
@@ -69,11 +59,9 @@ evidence: $(VENV)/dev-installed
 	$(BIN)/shipgym benchmark --controllers lq,tuned-ilos,wheel-over,tuned-wheel-over,mpc,ppo --out build/suite
 	$(BIN)/python scripts/best_known.py build/suite
 	$(BIN)/python scripts/train_pretrained.py --table build/suite
-	$(BIN)/python scripts/transfer.py --out build/transfer
-	$(BIN)/python scripts/certainty.py
-	$(BIN)/python scripts/opened_once.py
-	$(BIN)/python scripts/every_structure.py --draws 40 --out build/every_structure.jsonl
-	$(BIN)/python scripts/every_structure.py --draws 40 --out build/every_structure.jsonl --new
+	$(BIN)/python scripts/certainty.py --out build/certainty.jsonl
+	$(BIN)/python scripts/certainty.py --out build/certainty.jsonl --new
+	$(BIN)/python scripts/autopilots.py --rows build/autopilots.jsonl
 	$(BIN)/python scripts/bridge_logs.py
 	$(BIN)/python scripts/run_notebooks.py
 	$(BIN)/python scripts/tutorial.py
@@ -100,12 +88,6 @@ $(VENV)/demo-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 
 $(VENV)/dev-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(PIP) -e ".[dev]"
-	touch $@
-
-# other people's libraries, in a virtual environment of their own
-$(VENV)/ecosystem-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
-	$(PYTHON) -m venv $(VENV)/ecosystem
-	$(VENV)/ecosystem/bin/python -m pip install --quiet -c constraints.txt -e ".[rl]" skrl torchrl tianshou
 	touch $@
 
 clean:

@@ -1,13 +1,8 @@
 """Currents, models and autopilots from logs as ships make them, in current and wind.
 
     python scripts/bridge_logs.py [--seeds 8] [--models 2] [--ships kcs,tanker]
-    python scripts/bridge_logs.py --wind
-    python scripts/bridge_logs.py --parts [--seeds 8]
-    python scripts/bridge_logs.py --structures auto,nomoto,cubic [--ships kcs]
 
-prints the tables of docs/logs.md; the second needs the data of docs/real_ships.md, the
-third has logs of single trials, with a current and with none, and the fourth the turn
-not seen by structures with their usual methods.
+prints the tables of docs/logs.md.
 
 Every reference ship, and two ships by the MMG standard method (tests/ships/mmg.py),
 sails zigzags 10/10 and 20/20, a 35 degree turn to starboard and a 25 degree turn to
@@ -25,42 +20,34 @@ import argparse
 import sys
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from foreign_ships import ship_names, ship_of, with_shaft
+from real_ships.section import table
 
-ROOT = Path(__file__).parents[1]
-if str(ROOT) not in sys.path:
-    sys.path.insert(0, str(ROOT))
+from agents.controllers.lq import LQ
+from agents.controllers.pid import PID
+from agents.rollouts.course_keeping import sail
+from agents.verification.closed_loop import ClosedLoop
+from agents.verification.refusal import why_refused
+from agents.verification.tracks import judged_task
+from identification import IdentificationResult, identify
+from identification.judging.warnings import why_unstable
+from identification.samples.still_water import in_still_water
+from shipgym import ShipModel, Trial
+from shipgym.errors import InputError
+from shipgym.manoeuvres import turning_circle, zigzag
+from shipgym.sea import Current, Weather, Wind
+from shipgym.tasks.task import course_keeping_task
+from shipgym.trials.conventions import Conventions
+from shipgym.trials.midship import to_project_conventions
+from shipgym.trials.resampling import Log
+from shipgym.trials.sensors import GNSS, Sensor, Sensors
+from tests.ships.mmg import MMG_SHIPS
 
-from certainty import (  # noqa: E402
-    SHIPS,
-    ship_of,
-)
-from real_ships.section import table  # noqa: E402
-
-from agents.controllers.lq import LQ  # noqa: E402
-from agents.controllers.pid import PID  # noqa: E402
-from agents.rollouts.course_keeping import sail  # noqa: E402
-from agents.verification.closed_loop import ClosedLoop  # noqa: E402
-from agents.verification.refusal import why_refused  # noqa: E402
-from agents.verification.tracks import judged_task  # noqa: E402
-from identification import IdentificationResult, Preprocessing, identify  # noqa: E402
-from identification.judging.warnings import why_unstable  # noqa: E402
-from identification.samples.still_water import in_still_water  # noqa: E402
-from shipgym import ShipModel, Trial  # noqa: E402
-from shipgym.errors import InputError  # noqa: E402
-from shipgym.manoeuvres import turning_circle, zigzag  # noqa: E402
-from shipgym.sea import Current, Weather, Wind  # noqa: E402
-from shipgym.tasks.task import course_keeping_task  # noqa: E402
-from shipgym.trials.conventions import Conventions  # noqa: E402
-from shipgym.trials.midship import to_project_conventions  # noqa: E402
-from shipgym.trials.resampling import Log  # noqa: E402
-from shipgym.trials.sensors import GNSS, Sensor, Sensors  # noqa: E402
-from shipgym.trials.ship_file import ShipFile  # noqa: E402
-
+SHIPS = ("mariner", "container", "tanker", "kvlcc2", *MMG_SHIPS)
+FIRST_SEED = 100  # below 10 the recipes were chosen
 CURRENT, WIND = 0.5, 9.0  # m/s
 UNSEEN = "turn 25 port"
 RECIPES: dict[str, dict[str, Any]] = {
@@ -196,10 +183,7 @@ def logs_of(ship: ShipModel, seed: int) -> tuple[list[Trial], Weather]:
     runs = sailed(ship, CURRENT, towards, WIND, wind_from, 100 * seed)
     logs = []
     for k, run in enumerate(runs):
-        log = logged(run, 1000 * seed + k)
-        if "n" not in log:
-            log = log.with_channels({"n": np.ones(len(log))})
-        logs.append(log)
+        logs.append(with_shaft(logged(run, 1000 * seed + k)))
     return logs, weather
 
 
@@ -295,12 +279,12 @@ def _current_cells(errors: np.ndarray, deviations: np.ndarray) -> list[str]:
     ]
 
 
-def model_table(names: Sequence[str], seeds: range, recipes: Sequence[str]) -> str:
+def model_table(names: Sequence[str], seeds: range) -> str:
     """Heading of the unseen turn, and autopilots on the ship."""
     rows = []
     for name in names:
         ship = ship_of(name)
-        for title in recipes:
+        for title in RECIPES:
             for seed in seeds:
                 logs, weather = logs_of(ship, seed)
                 known = {
@@ -338,207 +322,18 @@ def model_table(names: Sequence[str], seeds: range, recipes: Sequence[str]) -> s
     return table(head, rows)
 
 
-def structures_table(
-    names: Sequence[str], seeds: range, structures: Sequence[str]
-) -> str:
-    """Heading error of the unseen turn by structures with their usual methods."""
-    rows = []
-    for name in names:
-        ship = ship_of(name)
-        for seed in seeds:
-            logs, _ = logs_of(ship, seed)
-            row = [name, str(seed)]
-            for structure in structures:
-                result = identify(
-                    logs,
-                    structure=structure,
-                    particulars=ship.particulars,
-                    steering=ship.steering,
-                )
-                chosen = result.model.structure if structure == "auto" else ""
-                row.append(f"{heading_error(result):.1f} {chosen}".strip())
-                print(row, file=sys.stderr, flush=True)
-            rows.append(row)
-    return table(["ship", "seed", *structures], rows)
-
-
-#: Trials of a log, by their places in `sailed`.
-PARTS = {
-    "zigzag 10/10": [0],
-    "zigzag 20/20": [1],
-    "both zigzags": [0, 1],
-    "35 deg turn": [2],
-    "all three": [0, 1, 2],
-}
-
-
-def parts_table(names: Sequence[str], seeds: range) -> str:
-    """How often a current is removed from logs of few trials, in calm weather."""
-    rows = []
-    for speed in (0.0, 0.6):
-        cases: dict[str, list[tuple[float, bool]]] = {name: [] for name in PARTS}
-        n_logs = 0
-        for name in names:
-            ship = ship_of(name)
-            for seed in seeds:
-                n_logs += 1
-                logs, truth = calm_logs(ship, speed, seed)
-                for part, places in PARTS.items():
-                    chosen = [logs[place] for place in places]
-                    cases[part] += removed_current(chosen, ship, truth)
-        for part, found in cases.items():
-            errors = [error for error, _ in found]
-            inside = sum(is_inside for _, is_inside in found)
-            rows.append(
-                [
-                    f"{speed:g} m/s",
-                    part,
-                    f"{len(found)} of {n_logs}",
-                    f"{max(errors):.3f}" if errors else "-",
-                    f"{inside} of {len(found)}" if found else "-",
-                ]
-            )
-    head = ["current", "log", "removed", "largest error, m/s", "inside 95 %"]
-    return table(head, rows)
-
-
-def calm_logs(
-    ship: ShipModel, speed: float, seed: int
-) -> tuple[list[Trial], np.ndarray]:
-    """Logs without wind, and the current to north and east, m/s."""
-    towards = np.random.default_rng(seed).uniform(0.0, 360.0)
-    logs = []
-    for k, run in enumerate(sailed(ship, speed, towards, 0.0, 0.0, 100 * seed)):
-        log = logged(run, 1000 * seed + k)
-        if "n" not in log:
-            log = log.with_channels({"n": np.ones(len(log))})
-        logs.append(log)
-    angle = np.radians(towards)
-    return logs, speed * np.array([np.cos(angle), np.sin(angle)])
-
-
-def removed_current(
-    logs: list[Trial], ship: ShipModel, truth: np.ndarray
-) -> list[tuple[float, bool]]:
-    """Error of a removed current, m/s, and whether its 95 % intervals hold the truth.
-
-    Nothing if none is removed.
-    """
-    _, found = in_still_water(logs, ship.particulars)
-    row = found.get("currents", {}).get(logs[0].name)
-    if row is None or not row["taken_out"]:
-        return []
-    error = np.array([row["north"], row["east"]]) - truth
-    is_inside = np.abs(error) < 1.96 * np.array(row["standard_errors"])
-    return [(float(np.hypot(*error)), bool(is_inside.all()))]
-
-
-def wind_table(recipes: Sequence[str]) -> str:
-    """Esso Osaka's zigzags, each predicted from the five others, with wind or not."""
-    ship = ShipFile.load(ROOT / "tests/ships/esso_osaka_3m.toml")
-    particulars = replace(ship.particulars, frontal_area=0.135, lateral_area=0.520)
-    names = ("t", "u", "v", "r", "psi", "n", "delta")
-    columns = dict(zip(names, names, strict=True)) | {
-        "x": "x0",
-        "y": "y0",
-        "wind_speed": "wind_true_speed",
-        "wind_from": "wind_true_dir",
-    }
-    paths = [
-        path for entry in ship.entries for path in entry.paths if "zigzag" in path.name
-    ]
-    runs = [
-        under_way(Trial.from_csv(path, columns, name=path.stem, kind="zigzag"))
-        for path in paths
-    ]
-    known = {"particulars": particulars, "steering": ship.steering}
-    rows = []
-    for title in recipes:
-        for wind in ("none", "auto", "constant")[: 2 if title == "mmg" else 3]:
-            errors = []
-            for held in runs:
-                trials = [
-                    run.with_(use="validate" if run is held else "fit") for run in runs
-                ]
-                result = identify(
-                    trials,
-                    wind=wind,
-                    preprocessing=Preprocessing(repair=True),
-                    **known,
-                    **ESSO_OSAKA[title],
-                )
-                error = result.metrics["trials"][held.name]["rmse"]["psi"]
-                errors.append(
-                    float("nan") if error is None else float(np.degrees(error))
-                )
-            told = {"none": "left in", "auto": "from columns", "constant": "constant"}[
-                wind
-            ]
-            rows.append(
-                [title, told, *(f"{e:.1f}" for e in errors), f"{np.mean(errors):.1f}"]
-            )
-    return table(["recipe", "wind", *(run.name[-8:] for run in runs), "mean"], rows)
-
-
-def under_way(trial: Trial) -> Trial:
-    """Every other sample of a trial from where the ship has way on her."""
-    first = int(np.argmax(np.hypot(trial["u"], trial["v"]) > 0.1))
-    rows = slice(first, None, 2)
-    return Trial(
-        trial.t[rows],
-        {name: v[rows] for name, v in trial.channels.items()},
-        name=trial.name,
-        kind=trial.kind,
-    )
-
-
-ESSO_OSAKA: dict[str, dict[str, Any]] = {
-    "mmg": {"structure": "mmg"},
-    "cubic": {"structure": "cubic"},
-    "cubic, pulled to the tanker": {"structure": "cubic", "prior": "tanker"},
-}
-
-
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=8, help="for the current")
-    parser.add_argument(
-        "--models", type=int, default=2, help="seeds of models and autopilots"
-    )
-    parser.add_argument(
-        "--first",
-        type=int,
-        default=100,
-        help="first seed; below 10 the recipes were chosen",
-    )
-    parser.add_argument("--ships", default=",".join(SHIPS))
-    parser.add_argument("--recipes", help="with semicolons between; by default all")
-    parser.add_argument("--wind", action="store_true", help="Esso Osaka only")
-    parser.add_argument("--parts", action="store_true", help="logs of few trials")
-    parser.add_argument("--structures", help="names with commas between")
+    parser.add_argument("--models", type=int, default=2, help="seeds of models")
+    parser.add_argument("--ships", type=ship_names, default=list(SHIPS))
     given = parser.parse_args()
     warnings.simplefilter("ignore")
-    every = ESSO_OSAKA if given.wind else RECIPES
-    recipes = given.recipes.split(";") if given.recipes else list(every)
-    if given.wind:
-        print(wind_table(recipes))
-        return
-    names = given.ships.split(",")
-    if given.structures:
-        seeds = range(given.first, given.first + given.models)
-        print(structures_table(names, seeds, given.structures.split(",")))
-        return
-    if given.parts:
-        print(parts_table(names, range(given.first, given.first + given.seeds)))
-        return
-    if given.seeds:
-        print(
-            current_table(names, range(given.first, given.first + given.seeds)),
-            end="\n\n",
-            flush=True,
-        )
-    print(model_table(names, range(given.first, given.first + given.models), recipes))
+
+    print(current_table(given.ships, range(FIRST_SEED, FIRST_SEED + given.seeds)))
+    print()
+    print(model_table(given.ships, range(FIRST_SEED, FIRST_SEED + given.models)))
 
 
 if __name__ == "__main__":

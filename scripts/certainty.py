@@ -1,378 +1,341 @@
-"""Coverage of the 95 % intervals of standard indices, on ships of other equations.
+"""Coverage of the intervals of everything that `auto` can choose, on foreign ships.
 
-    python scripts/certainty.py [--seeds 3] [--draws 40] [--ships kcs,tanker]
+    python scripts/certainty.py [--out FILE] [--quick | --new]
+    python scripts/certainty.py --out FILE --table
 
-prints the tables of docs/certainty.md. Ships that it knows besides: `--ships
-stable-light,stable-heavy, lively-light,lively-heavy` (tests/ships/square_drag.py) and
-`--ships ferry,product-tanker,training-vessel` (tests/ships/inoue.py).
+prints the tables of docs/certainty.md. Each ship of tests/ships/foreign.py is
+identified by each structure of `auto`, and by `auto` itself, from what a user records:
+zigzags 10/10 and 20/20 to both sides, with the noise of sensors. The 95 % intervals of
+models drawn are compared with the ship herself:
 
-Every reference ship, and two ships by the MMG standard method (tests/ships/mmg.py), is
-put through sea trials with the noise of sensors: zigzags 10/10 and 20/20 to both sides,
-without turns, with a 35 degree turn to starboard, and with one to each side. She is
-identified by structures that are not hers. The indices of models drawn are compared
-with her own: advance and tactical diameter to both sides, overshoots and initial
-turning of the zigzags; and those of manoeuvres that are not among the trials, turns
-with 20 degrees and zigzags 15/15 besides.
+* in the data's range: overshoots of zigzags 10/10, 15/15 and 20/20 to both sides, and
+  the motion in a zigzag 15/15, open loop from her rudder;
+* beyond: advance and tactical diameter of 35 degree turns, where a structure predicts a
+  track, and the motion in them.
+
+An index counts once; a motion counts by the share of its samples, over the channels
+that the structure predicts. Half-widths are by the true index, or by the largest value
+of the channel. Heading errors of the turns stand beside those of Norrbin's equation by
+output error. FILE has a row of JSON a case, written as it goes; cases that it has are
+not done again.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+import time
 import warnings
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
+from foreign_ships import KeptRows, Row, identified, sea_trials, ship_names, with_shaft
 
-ROOT = Path(__file__).parents[1]
-if str(ROOT) not in sys.path:
-    sys.path.insert(0, str(ROOT))
-
-import shipgym  # noqa: E402 - the folder above has to be found first
-from identification import IdentificationResult, identify  # noqa: E402
-from identification.judging.model_error import DEFAULT  # noqa: E402
-from shipgym import ShipModel, Trial  # noqa: E402
-from shipgym.errors import InputError  # noqa: E402
-from shipgym.manoeuvres import (  # noqa: E402
+from identification.judging.predicted import predicted_channels, predicts_track
+from identification.judging.prediction import predict
+from identification.judging.selection import STRUCTURES
+from shipgym import InputError, ShipModel, Trial
+from shipgym.arrays import Floats
+from shipgym.manoeuvres import (
     Manoeuvre,
-    TurningIndices,
     ZigzagIndices,
     turning_circle,
-    turning_indices,
     zigzag,
     zigzag_indices,
 )
-from shipgym.manoeuvres.imo_rules import imo_manoeuvres  # noqa: E402
-from shipgym.manoeuvres.intervals import (  # noqa: E402
+from shipgym.manoeuvres.imo_rules import imo_manoeuvres
+from shipgym.manoeuvres.intervals import (
     IndexInterval,
     attempt,
     intervals_of,
     own_indices,
 )
-from shipgym.manoeuvres.registry import standard_time  # noqa: E402
-from shipgym.trials.sensors import Sensors  # noqa: E402
-from tests.ships.foreign import FOREIGN  # noqa: E402
-from tests.ships.mmg import MMG_SHIPS  # noqa: E402
+from shipgym.manoeuvres.registry import standard_time
+from tests.ships.foreign import FOREIGN, KNOWN, SECOND_FIVE
 
-Value = TypeVar("Value")
-Key = dict[tuple[str, str], Value]  # by manoeuvre and name of the index
-
-SHIPS = ("mariner", "container", "tanker", "kvlcc2", *MMG_SHIPS)
-STRUCTURES = ("abkowitz", "cubic")
-OTHER = "other "  # begins the names of manoeuvres that are not among the standard ones
-OWN = {"mariner": "abkowitz"}  # the structure that a ship is made of
-TRIALS = ("zigzags", "zigzags and turn", "zigzags and turns")
-TURNS = (
-    ("starboard", 35.0),
-    ("port", -35.0),
-)  # none, the first or both of them are sailed
-INDICES = (
-    "advance_lengths",
-    "tactical_diameter_lengths",
-    "overshoot_1_deg",
-    "overshoot_2_deg",
-    "initial_turning_lengths",
-)
-
-
-def ship_of(name: str) -> ShipModel:
-    """A ship by name, the truth behind the trials."""
-    return FOREIGN[name]() if name in FOREIGN else shipgym.load_model(name)
-
-
-def ship_names(text: str) -> list[str]:
-    """Names of ships, separated by commas, as an argument; exit code 2 for unknown."""
-    names = text.split(",")
-    for name in names:
-        try:
-            ship_of(name)
-        except InputError as error:
-            foreign = ", ".join(FOREIGN)
-            raise argparse.ArgumentTypeError(f"{error}; or of {foreign}") from None
-    return names
-
-
-def sea_trials(ship: ShipModel, kind: str, seed: int) -> list[Trial]:
-    """Her trials as sensors log them; a ship without a shaft logs a steady one."""
-    travel = ship.particulars["length"] / ship.particulars["speed"]
-    dt = min(0.25, travel / 80.0)
-    runs = [
-        zigzag(ship, angle, angle, port, 35.0 * travel, dt).with_(
-            name=f"{angle:.0f} {'port' if port else 'starboard'}"
-        )
-        for angle in (10.0, 20.0)
-        for port in (False, True)
-    ]
-    for side, angle in TURNS[: TRIALS.index(kind)]:
-        runs.append(
-            turning_circle(ship, angle, 25.0 * travel, dt).with_(name=f"turn to {side}")
-        )
-    sensors = Sensors(sampling_s=max(min(1.0, travel / 20.0), dt))
-    steady = np.full(len(runs[0].t), 1.0)
-    return [
-        sensors.measure(
-            (
-                run
-                if "n" in run
-                else Trial(
-                    run.t,
-                    {**run.channels, "n": np.resize(steady, len(run.t))},
-                    name=run.name,
-                    kind=run.kind,
-                )
-            ),
-            100 * seed + k,
-        )
-        for k, run in enumerate(runs)
-    ]
+AUTO = "auto"
+NORRBIN = "norrbin"
+IN_RANGE, BEYOND = "in range", "beyond"
+PARTS = (IN_RANGE, BEYOND)
+KINDS = ("indices", "motion")
+#: The ships that the error of hard turns was worked out on.
+WORKED_ON = [name for name in KNOWN if name not in ("stable-heavy", "lively-light")]
+QUICK = ("naval-vessel", "ferry", "kcs")
+Key = tuple[str, str]  # a manoeuvre and the name of an index
 
 
 def compared(ship: ShipModel) -> dict[str, Manoeuvre]:
-    """Manoeuvres of the comparison: the standard ones and others of the envelope."""
+    """Manoeuvres whose indices are compared: IMO's and zigzags 15/15."""
     duration, dt = standard_time(ship)
-    turn, weave = (
-        partial(turning_circle, duration=duration, dt=dt),
-        partial(zigzag, duration=duration, dt=dt),
-    )
-    others = {
-        f"{OTHER}turning circle to {side}": Manoeuvre(
-            partial(turn, rudder_deg=np.sign(angle) * 20.0),
-            turning_indices,
-            TurningIndices,
-        )
-        for side, angle in TURNS
-    } | {
-        f"{OTHER}zigzag, {side} first": Manoeuvre(
-            partial(
-                weave,
-                rudder_deg=15.0,
-                heading_deg=15.0,
-                port_first=angle < 0.0,
-                must_reverse=False,
-            ),
-            zigzag_indices,
-            ZigzagIndices,
-        )
-        for side, angle in TURNS
-    }
-    return {
+    found = {
         name: one for name, one in imo_manoeuvres(ship).items() if "stop" not in name
-    } | others
+    }
+    for side, port in (("starboard", False), ("port", True)):
+        weave = partial(
+            zigzag,
+            duration=duration,
+            dt=dt,
+            rudder_deg=15.0,
+            heading_deg=15.0,
+            port_first=port,
+            must_reverse=False,
+        )
+        found[f"zigzag 15/15, {side} first"] = Manoeuvre(
+            weave, zigzag_indices, ZigzagIndices
+        )
+    return found
 
 
-def was_sailed(manoeuvre: str, kind: str) -> bool:
-    """Whether a manoeuvre is one of the trials of a kind."""
-    turns = tuple(f"to {side}" for side, _ in TURNS[: TRIALS.index(kind)])
-    return not manoeuvre.startswith(OTHER) and (
-        manoeuvre.startswith("zigzag") or manoeuvre.endswith(turns)
-    )
+def part_of(key: Key) -> str | None:
+    """Where an index belongs; None for those that are not compared."""
+    manoeuvre, index = key
+    if "zigzag" in manoeuvre and "overshoot" in index:
+        return IN_RANGE
+    is_track = index in ("advance_lengths", "tactical_diameter_lengths")
+    return BEYOND if manoeuvre.startswith("turning") and is_track else None
 
 
-def true_indices(ship: ShipModel) -> Key[float]:
+def true_indices(ship: ShipModel) -> dict[Key, float]:
     """Indices of a ship, by manoeuvre and name."""
     found = {run: attempt(one.evaluate, ship)[0] for run, one in compared(ship).items()}
     return {
-        (run, name): indices[name]
+        (run, name): value
         for run, indices in found.items()
-        for name in INDICES
-        if name in indices
+        for name, value in indices.items()
     }
 
 
-def index_intervals(model: ShipModel, draws: int, seed: int = 1) -> Key[IndexInterval]:
-    """The same indices of a model, with intervals over draws from its covariance."""
+def index_intervals(model: ShipModel, draws: int) -> dict[Key, IndexInterval]:
+    """Indices of a model, with intervals over draws from its covariance."""
     tests = compared(model)
     found = intervals_of(
         own_indices(model, tests),
-        model.sample(draws, seed),
+        model.sample(draws, 1),
         {run: one.evaluate for run, one in tests.items()},
     )
     return {
         (run, name): one
         for run, indices in found.items()
         for name, one in indices.items()
-        if name in INDICES
+        if part_of((run, name))
     }
 
 
-def holds(found: Key[IndexInterval], truth: Key[float]) -> Key[bool]:
-    """Whether each interval holds the truth."""
+def runs_of(ship: ShipModel) -> dict[str, list[Trial]]:
+    """Her own motion in manoeuvres that are not among the trials."""
+    duration, dt = standard_time(ship)
+    weave = partial(zigzag, ship, 15.0, 15.0, duration=duration / 2.0, dt=dt)
+    turn = partial(turning_circle, ship, duration=duration / 2.0, dt=dt)
     return {
-        key: (
-            one.interval is not None
-            and one.interval[0] <= truth[key]
-            and (one.interval[1] is None or truth[key] <= one.interval[1])
-        )
-        for key, one in found.items()
+        IN_RANGE: [with_shaft(weave(port_first=port)) for port in (False, True)],
+        BEYOND: [with_shaft(turn(rudder_deg=side * 35.0)) for side in (1.0, -1.0)],
     }
 
 
-def fitted(
-    ship: ShipModel, structure: str, trials: list[Trial]
-) -> IdentificationResult:
-    """A ship identified by a structure, or `grey-box:SHIP`: RM-SVM on that ship."""
-    table, _, reference = structure.partition(":")
-    grey = {"reference_model": reference, "method": "rm-svm"} if reference else {}
-    return identify(
-        trials, table, particulars=ship.particulars, steering=ship.steering, **grey
-    )
+def motion(model: ShipModel, drawn: Sequence[ShipModel], run: Trial) -> Row:
+    """Shares of a run's samples within the intervals, half-widths, lost draws."""
+    sailed = [predict(draw, run) for draw in drawn]
+    kept = [trial for trial in sailed if trial is not None]
+    found: Row = {"ran away": 1.0 - len(kept) / len(drawn), "held": [], "width": []}
+    names = predicted_channels(model) if len(kept) > 1 else ()
+    samples = slice(5, None, 5)
+    for name in names:
+        values = np.array([trial[name][samples] for trial in kept])
+        low, high = np.quantile(values, (0.025, 0.975), axis=0)
+        truth = run[name][samples]
+        held = (low <= truth) & (truth <= high)
+        found["held"].append(float(held.mean()))
+        half = np.median(high - low) / 2.0
+        found["width"].append(float(half / np.abs(truth).max()))
+    return found
 
 
-def without_fitted(error: dict[str, object]) -> float:
-    """The factor of a model if errors on the fitted trials did not count."""
-    if "fitted" not in error:
-        return float(error["factor"])
-    sizes = [error[name] for name in ("motion", "indices") if name in error]
-    return (
-        max(1.0, error["for_few_trials"] * np.sqrt(np.mean(np.square(sizes))))
-        if sizes
-        else DEFAULT
-    )
+def heading_error(model: ShipModel, run: Trial) -> float | None:
+    """Root mean square error of the heading in a run, degrees; None if it runs away."""
+    sailed = predict(model, run)
+    if sailed is None:
+        return None
+    error: Floats = sailed["psi"] - run["psi"]
+    return float(np.degrees(np.sqrt(np.mean(error**2))))
 
 
-def coverage(ship: ShipModel, model: ShipModel, draws: int) -> dict[str, object]:
-    """Flags of intervals that hold a ship's indices.
-
-    By noise, by trials left out, and by all.
-    """
-    error = model.provenance["model_error"]
-    row: dict[str, object] = {"factor": (factor := error["factor"])}
+def indices(model: ShipModel, ship: ShipModel, draws: int) -> dict[str, Row]:
+    """Indices within their intervals, and half-widths, in range and beyond."""
     truth = true_indices(ship)
-    for label, size in (
-        ("noise", factor**-2),
-        ("left out", (without_fitted(error) / factor) ** 2),
-        ("all", 1.0),
-    ):
-        found = index_intervals(
-            replace(model, covariance=size * model.covariance), draws
-        )
-        row[label] = holds(found, truth)
-        row[f"{label} ran away"] = float(
-            np.mean([one.ran_away.mean() for one in found.values()])
-        )
-        widths = [
-            np.ptp(one.interval) / 2.0 / truth[key]
-            for key, one in found.items()
-            if one.interval and one.interval[1] is not None
-        ]
-        row[f"{label} width"] = float(np.median(widths))
+    found: dict[str, Row] = {part: {"held": [], "width": []} for part in PARTS}
+    for key, one in index_intervals(model, draws).items():
+        part = part_of(key)
+        if part is None or (part == BEYOND and not predicts_track(model)):
+            continue
+        row = found[part]
+        if one.interval is None:
+            row["held"].append(False)
+            continue
+        low, high = one.interval
+        if high is None:  # too many draws run away for an upper bound
+            high = np.inf
+        held = low <= truth[key] <= high
+        row["held"].append(held)
+        if np.isfinite(high):
+            row["width"].append((high - low) / 2.0 / truth[key])
+    return found
+
+
+def case(name: str, structure: str, seed: int, draws: int) -> Row:
+    """One ship, structure and seed of the noise."""
+    warnings.simplefilter("ignore")
+    ship = FOREIGN[name]()
+    trials = sea_trials(ship, seed)
+    row: Row = {"ship": name, "structure": structure, "seed": seed}
+    began = time.process_time()
+    try:
+        result = identified(ship, structure, trials)
+    except InputError as error:
+        return row | {"refused": str(error)}
+    model = result.model
+    row |= {
+        "seconds": time.process_time() - began,
+        "chosen": model.structure,
+        "stable": result.stable,
+    }
+    if not result.stable:
+        return row
+    runs = runs_of(ship)
+    row["turns"] = [heading_error(model, run) for run in runs[BEYOND]]
+    row["indices"] = indices(model, ship, draws)
+    drawn = model.sample(draws, 1)
+    row["motion"] = {
+        part: [motion(model, drawn, run) for run in some] for part, some in runs.items()
+    }
     return row
 
 
-def case(
-    name: str, structure: str, kind: str, seed: int, draws: int
-) -> dict[str, object]:
-    """Coverage of one case without and with model error, as lists of flags."""
-    warnings.simplefilter("ignore")
-    ship = ship_of(name)
-    result = fitted(ship, structure, sea_trials(ship, kind, seed))
-    row: dict[str, object] = {
-        "ship": name,
-        "structure": structure,
-        "trials": kind,
-        "seed": seed,
-    }
-    return row | (
-        coverage(ship, result.model, draws) if result.stable else {"unstable": True}
-    )
-
-
-def share(rows: Sequence[dict[str, object]], label: str, part: str = "") -> str:
-    """Per cent of the intervals that hold the truth, of manoeuvres with such a name."""
-    held = [
-        one
-        for row in rows
-        for (run, _), one in row[label].items()
-        if run.startswith(part) and not run.startswith(OTHER)
-    ]
-    return f"{100.0 * np.mean(held):.0f}" if held else "-"
-
-
-def share_not_sailed(rows: Sequence[dict[str, object]], label: str) -> str:
-    """Per cent likewise, of the manoeuvres that are not among the trials."""
-    held = [
-        one
-        for row in rows
-        for (run, _), one in row[label].items()
-        if not was_sailed(run, row["trials"])
-    ]
-    return f"{100.0 * np.mean(held):.0f}"
-
-
-def table(rows: Sequence[dict[str, object]]) -> str:
-    """The table, in Markdown: a row for each ship and trials, and one for all."""
-    groups = {
-        f"{ship}, {kind}": [r for r in rows if (r["ship"], r["trials"]) == (ship, kind)]
-        for ship in dict.fromkeys(row["ship"] for row in rows)
-        for kind in TRIALS
-    }
-    for kind in TRIALS:
-        groups[f"**all, {kind}**"] = [row for row in rows if row["trials"] == kind]
-    groups["**all**"] = list(rows)
-    lines = [
-        (
-            "| ship, trials | factor | noise only, % | with model error, % | of which"
-            " zigzags, turns, % | not sailed (by trials left out alone), % |"
-            " half-width, % | draws that run away, % |"
-        ),
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
-    ]
-    for name, group in groups.items():
-        known = [row for row in group if "factor" in row]
-        if not known:
+def told(rows: Iterable[Row], kind: str, part: str, what: str) -> list[float]:
+    """Flags, shares or half-widths of some cases, in a list."""
+    found: list[float] = []
+    for row in rows:
+        if kind not in row:
             continue
-        factors = [float(row["factor"]) for row in known]
-        width, lost = (
-            100.0 * np.mean([row[f"all {one}"] for row in known])
-            for one in ("width", "ran away")
-        )
-        unstable = (
-            f" ({len(group) - len(known)} of {len(group)} unstable)"
-            if len(known) < len(group)
-            else ""
-        )
-        lines.append(
-            f"| {name}{unstable} | {min(factors):.1f} to {max(factors):.1f} |"
-            f" {share(known, 'noise')} | {share(known, 'all')} |"
-            f" {share(known, 'all', 'zigzag')}, {share(known, 'all', 'turning')} |"
-            f" {share_not_sailed(known, 'all')} ({share_not_sailed(known, 'left out')})"
-            f" | {width:.0f} | {lost:.0f} |"
-        )
+        some = row[kind][part]
+        for one in some if kind == "motion" else [some]:
+            found += one[what]
+    return found
+
+
+def percent(values: Sequence[float], take: Callable[[Sequence[float]], Any]) -> str:
+    """A figure of some values in per cent."""
+    return f"{100.0 * float(take(values)):.0f}" if values else "-"
+
+
+def worst(rows: Sequence[Row], part: str) -> str:
+    """The case that holds the fewest indices, of ship and structure."""
+    least, who = 2.0, "-"
+    pairs = dict.fromkeys((row["ship"], row["structure"]) for row in rows)
+    for pair in pairs:
+        own = [row for row in rows if (row["ship"], row["structure"]) == pair]
+        held = told(own, "indices", part, "held")
+        if held and np.mean(held) < least:
+            least, who = float(np.mean(held)), pair[0]
+    return f"{who} {100.0 * least:.0f}" if who != "-" else who
+
+
+def line(name: str, rows: Sequence[Row]) -> str:
+    """A row of the table of coverage."""
+    cells = []
+    for kind in KINDS:
+        for part in PARTS:
+            held = percent(told(rows, kind, part, "held"), np.mean)
+            width = percent(told(rows, kind, part, "width"), np.median)
+            cells.append(f"{held} ({width})")
+    lost = [
+        one["ran away"]
+        for row in rows
+        if "motion" in row
+        for one in row["motion"][BEYOND]
+    ]
+    usable = sum("indices" in row for row in rows)
+    cells += [percent(lost, np.mean), worst(rows, IN_RANGE), worst(rows, BEYOND)]
+    return f"| {name} | {usable} of {len(rows)} | {' | '.join(cells)} |"
+
+
+def table(rows: Sequence[Row], by: str) -> str:
+    """The table of coverage, by structure or by ship."""
+    lines = [
+        f"| {by} | stable | indices in range | indices beyond | motion in range |"
+        " motion beyond | draws that run away | worst in range | worst beyond |",
+        "| --- " * 9 + "|",
+    ]
+    for name in dict.fromkeys(row[by] for row in rows):
+        lines.append(line(name, [row for row in rows if row[by] == name]))
+    lines.append(line("**all**", rows))
     return "\n".join(lines)
 
 
+def turns(rows: Sequence[Row]) -> str:
+    """Heading errors of the unseen turns by `auto` and by Norrbin's equation."""
+    lines = [
+        "| ship | `auto` took | its error, deg | Norrbin's, deg | within the aim |",
+        "| --- " * 5 + "|",
+    ]
+    by_case = {(row["ship"], row["seed"], row["structure"]): row for row in rows}
+    good = counted = 0
+    for (ship, seed, structure), row in by_case.items():
+        if structure != AUTO:
+            continue
+        plain = by_case.get((ship, seed, NORRBIN), {})
+        own, other = error_of(row), error_of(plain)
+        within = own < 5.0 or own <= 1.3 * other
+        counted += 1
+        good += within
+        answer = "yes" if within else "no"
+        chosen = row.get("chosen", "-")
+        lines.append(f"| {ship} | `{chosen}` | {own:.1f} | {other:.1f} | {answer} |")
+    lines.append(f"| **all** | | | | {good} of {counted} |")
+    return "\n".join(lines)
+
+
+def error_of(row: Row) -> float:
+    """Mean error over both turns; infinite where there is none."""
+    errors = row.get("turns")
+    if not errors or None in errors:
+        return np.inf
+    return float(np.mean(errors))
+
+
 def main() -> None:
-    """Run all cases and print the table."""
+    """Run the cases that are missing and print the tables."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument("--seeds", type=int, default=3, help="of the noise")
-    parser.add_argument("--draws", type=int, default=40, help="models drawn")
-    parser.add_argument("--ships", default=",".join(SHIPS), help="with commas between")
-    parser.add_argument(
-        "--structures",
-        default=",".join(STRUCTURES),
-        help="grey-box:SHIP is RM-SVM on a reference ship",
-    )
-    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--out", type=Path, default=Path("certainty.jsonl"))
+    parser.add_argument("--seeds", type=int, default=1, help="of the noise")
+    parser.add_argument("--draws", type=int, default=60, help="models drawn")
+    parser.add_argument("--ships", type=ship_names, default=",".join(WORKED_ON))
+    parser.add_argument("--new", action="store_true", help="the five that came second")
+    parser.add_argument("--structures", default=",".join((*STRUCTURES, AUTO)))
+    parser.add_argument("--quick", action="store_true", help="three ships, 30 draws")
+    parser.add_argument("--table", action="store_true", help="of FILE, nothing is run")
     given = parser.parse_args()
+    ships = list(SECOND_FIVE) if given.new else given.ships
+    draws = given.draws
+    if given.quick:
+        ships, draws = list(QUICK), 30
+    kept = KeptRows(given.out, ("ship", "structure", "seed"))
     cases = [
-        (ship, structure, kind, seed, given.draws)
-        for ship in given.ships.split(",")
+        (ship, structure, seed)
+        for ship in ships
         for structure in given.structures.split(",")
-        if OWN.get(ship) != structure
-        for kind in TRIALS
         for seed in range(given.seeds)
+        if (ship, structure, seed) not in kept
     ]
-    rows = Parallel(n_jobs=given.workers, verbose=5)(
-        delayed(case)(*one) for one in cases
-    )
-    print(table(rows))
+    for k, (ship, structure, seed) in enumerate([] if given.table else cases):
+        print(f"{k + 1} of {len(cases)}: {ship}, {structure}", file=sys.stderr)
+        kept.add(case(ship, structure, seed, draws))
+    rows = kept.rows
+    print(table(rows, "structure"), table(rows, "ship"), turns(rows), sep="\n\n")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Two ships with cross-flow drag by strips, surge, sway and yaw.
 
-Made for `scripts/opened_once.py`.
+Made for `scripts/certainty.py`.
 
 A supply vessel with the main dimensions of `osv` of the MSS toolbox (Fossen 2021,
 Handbook of Marine Craft Hydrodynamics and Motion Control), which is steered by azimuth

@@ -1,4 +1,4 @@
-"""Ships by name whose equations no structure has, for `scripts/every_structure.py`.
+"""Ships by name whose equations no structure has, for `scripts/certainty.py`.
 
 `KNOWN` were looked at while rules were made; `SECOND_FIVE` were written, and committed,
 before any of them was identified.

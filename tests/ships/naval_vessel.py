@@ -1,6 +1,6 @@
 """Naval vessel of 51.5 m, 4 degrees of freedom.
 
-Surge, sway, yaw and roll; made for `scripts/opened_once.py`.
+Surge, sway, yaw and roll; made for `scripts/certainty.py`.
 
 Hull: Blanke & Christensen 1993, Rudder-roll damping autopilot robustness to
 sway-yaw-roll couplings, 10th Ship Control Systems Symposium, Ottawa; from roll planar

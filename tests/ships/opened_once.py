@@ -1,4 +1,4 @@
-"""Ships by name whose equations no structure has, for `scripts/opened_once.py`."""
+"""Ships by name whose equations no structure has, for `scripts/certainty.py`."""
 
 from collections.abc import Callable
 

@@ -1,0 +1,180 @@
+"""Which autopilots are given, and what they do on ships of other equations.
+
+    python scripts/autopilots.py [--rows autopilots.jsonl] [--ships kcs,ferry]
+
+prints the tables of "On ships that nobody designed for" in docs/controllers.md. Each
+ship of tests/ships is put through zigzags 10/10 and 20/20 to both sides with the noise
+of sensors, identified, and given the autopilots of `shipgym autopilot`, judged on 60
+models drawn. What was designed, given or not, then steers the ship herself: a course
+autopilot steers if it keeps control in 8 episodes of course keeping in calm water, a
+path autopilot if it leads her along 50 drawn paths, half of them in a current of a
+tenth of her speed. The costs on paths stand beside those of wheel-over.
+
+Rows are kept in a file; a second call does what is left.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import sys
+import warnings
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from foreign_ships import KeptRows, Row, identified, sea_trials, ship_names, ship_of
+
+from agents import rollout, sail
+from agents.controllers.controller import Controller
+from agents.rollouts.metrics import metrics, recorded_for_metrics
+from agents.verification.chain import examined
+from agents.verification.verify import DESIGNS, design_autopilots, verify
+from shipgym import Current, InputError, ShipModel, Weather
+from shipgym.envs.engine import Engine
+from shipgym.tasks import course_keeping_task, path_following_task
+from tests.ships.foreign import FOREIGN
+
+STRUCTURES = ("nomoto", "abkowitz", "mmg", "auto")
+DRAWS = 60
+FIRST_SEED = 2_000_000  # of the paths; a search's begin at 500,000
+PATHS = 25  # in each of the currents
+CURRENTS = (0.0, 0.1)  # of the ship's speed
+HEADINGS = np.arange(8)  # seeds of course keeping
+
+
+def case(name: str, structure: str, seed: int) -> Row:
+    """Which designs are given for one ship, and what each does on the ship herself."""
+    ship = ship_of(name)
+    row: Row = {"ship": name, "structure": structure, "seed": seed}
+    try:
+        fit = identified(ship, structure, sea_trials(ship, seed))
+    except InputError as error:
+        return row | {"failed": str(error)}
+    result = examined(
+        None, fit, [], lambda: verify(fit.model, DRAWS, 0, trials=fit.trials)
+    )
+    row["chosen"] = fit.model.structure
+
+    found = result.verification
+    if found is None:
+        designs = designed(fit.model)
+        why = result.refusal or result.instability
+        row["refused"] = {design.kind: why for design in designs}
+    else:
+        designs = [pilot.controller for pilot in [*found.pilots, *found.tracks]]
+        row["refused"] = found.refused
+    row["steered"] = {design.kind: steered(design, ship) for design in designs}
+    return row
+
+
+def designed(model: ShipModel) -> list[Controller]:
+    """Designs on a model that is refused as a whole."""
+    try:
+        found = design_autopilots(model, DESIGNS)
+    except InputError:
+        return []
+    return [*found.controllers, *found.guides]
+
+
+def steered(design: Controller, ship: ShipModel) -> Row:
+    """Whether a design loses the ship, and its cost on paths."""
+    if not design.has_autopilot:
+        task = course_keeping_task(sea="calm")
+        episodes = sail(design, ship, task, seeds=HEADINGS)
+        return {"lost": int(episodes.terminated.sum())}
+    costs: list[float] = []
+    lost = 0
+    for share in CURRENTS:
+        current = Current(share * ship.particulars["speed"], towards_deg=90.0)
+        task = path_following_task(sea=Weather(current=current))
+        engine = Engine(ship, PATHS, task)
+        seeds = FIRST_SEED + np.arange(PATHS)
+        figures = metrics(
+            rollout(design, engine, seeds, record=recorded_for_metrics(task))
+        )
+        costs.extend(figures["cost"])
+        lost += int(figures["terminated"].sum())
+    return {"lost": lost, "cost": float(np.mean(costs))}
+
+
+def counted(rows: Sequence[Mapping[str, Any]]) -> Counter[str]:
+    """Designs by whether they steer and whether they are given."""
+    counts: Counter[str] = Counter()
+    for row in rows:
+        counts["ships"] += 1
+        given = 0
+        for kind, fate in row.get("steered", {}).items():
+            does = "lost" if fate["lost"] else "steer"
+            is_refused = kind in row["refused"]
+            counts[f"{does} {'refused' if is_refused else 'given'}"] += 1
+            given += not is_refused
+        counts["ships with one"] += given > 0
+    return counts
+
+
+def table_of_given(rows: Sequence[Row]) -> str:
+    """Designs given and refused by structure, in Markdown."""
+    lines = [
+        "| structure | ships with an autopilot | given: steer, lost |"
+        " refused: would steer, would not |",
+        "| --- | --- | --- | --- |",
+    ]
+    groups = {f"`{row['structure']}`": [] for row in rows} | {"**all**": list(rows)}
+    for row in rows:
+        groups[f"`{row['structure']}`"].append(row)
+    for name, group in groups.items():
+        n = counted(group)
+        lines.append(
+            f"| {name} | {n['ships with one']} of {n['ships']} |"
+            f" {n['steer given']}, {n['lost given']} |"
+            f" {n['steer refused']}, {n['lost refused']} |"
+        )
+    return "\n".join(lines)
+
+
+def table_of_paths(rows: Sequence[Row]) -> str:
+    """Cost and ships lost on paths, by ship, in Markdown."""
+    led = [
+        (row, {k: one for k, one in row.get("steered", {}).items() if "cost" in one})
+        for row in rows
+    ]
+    guides = list(dict.fromkeys(kind for _, costs in led for kind in costs))
+    lines = ["| ship, structure | " + " | ".join(guides) + " |"]
+    lines.append("| --- |" + " --- |" * len(guides))
+    for row, costs in led:
+        cells = [
+            f"{costs[one]['cost']:.1f}, {costs[one]['lost']}" if one in costs else "-"
+            for one in guides
+        ]
+        lines.append(f"| {row['ship']}, {row['structure']} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Do the cases that are left, and print the tables."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--rows", type=Path, default=Path("autopilots.jsonl"))
+    parser.add_argument("--seeds", type=int, default=1, help="of the noise")
+    parser.add_argument("--ships", type=ship_names, default=list(FOREIGN))
+    parser.add_argument("--structures", default=",".join(STRUCTURES))
+    given = parser.parse_args()
+    warnings.simplefilter("ignore")
+
+    kept = KeptRows(given.rows, ("ship", "structure", "seed"))
+    structures = given.structures.split(",")
+    for structure, name, seed in itertools.product(
+        structures, given.ships, range(given.seeds)
+    ):
+        if (name, structure, seed) not in kept:
+            kept.add(case(name, structure, seed))
+            print(structure, name, file=sys.stderr, flush=True)
+    print(table_of_given(kept.rows), table_of_paths(kept.rows), sep="\n\n")
+
+
+if __name__ == "__main__":
+    main()
