@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from agents.benchmarking.entries import Entry
-from agents.benchmarking.sources import BEST_KNOWN, file_hash, names_code, policy_hash
+from agents.benchmarking.sources import BEST_KNOWN, file_hash, policy_hash
 from agents.controllers.interface import Policy
 from agents.suites.reference import best_costs
 from agents.suites.suite import BenchmarkTask
@@ -120,7 +120,7 @@ def run_cell(entry: Entry, task: BenchmarkTask, n_episodes: int) -> Cell:
     except InputError as error:
         return Cell(refused=str(error))
     except Exception as error:
-        if entry.is_text and not names_code(entry.source):
+        if entry.is_text and not entry.is_code:
             raise
         # a user's own function may raise anything
         return Cell(refused=f"{type(error).__name__}: {error}")

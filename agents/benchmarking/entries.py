@@ -11,8 +11,8 @@ A controller is named, on the command line and in Python, as
     runs/model.zip        an agent as stable-baselines3 saves it
     runs/{task}-*.json    one file for each task; several that match are training runs
     a.json+b.json         training runs, file by file
-    my_module:factory     a function that returns a controller for a `BenchmarkTask`
-    my_module:Mine        a subclass of `agents.Controller`
+    my_module:factory     a function that returns a controller for a `BenchmarkTask`,
+                          or a subclass of `agents.Controller`; its code is run
     name=...              any of these under another name
 """
 
@@ -21,11 +21,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.benchmarking.isolated import (
-    ContestantError,
-    IsolatedPolicy,
-    LostContestant,
-)
 from agents.benchmarking.sources import (
     Source,
     check_module,
@@ -41,7 +36,6 @@ from agents.benchmarking.sources import (
 )
 from agents.controllers.interface import Policy, check_fits, model_hash
 from agents.suites.suite import BenchmarkTask
-from shipgym import load_model
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
 
@@ -67,6 +61,11 @@ class Entry:
         """Return whether another process can make it too."""
         return isinstance(self.source, str)
 
+    @property
+    def is_code(self) -> bool:
+        """Return whether it is `module:function`, whose code is run."""
+        return self.is_text and names_code(self.source)
+
     def policies(self, task: BenchmarkTask) -> tuple[Policy, ...]:
         """Make its controllers for a task, one for each training run.
 
@@ -74,8 +73,6 @@ class Entry:
         or was designed on the ship that it should not know.
         """
         where = f"'{self.name}' on task '{task.name}'"
-        if self.is_text and names_code(self.source):
-            return (self._isolated(task, where),)
         design = task.design_task
         policies = make_policies(self.source, design)
         for policy in policies:
@@ -83,20 +80,6 @@ class Entry:
             if task.true_ship:
                 _check_design(design_hashes(policy), task, where)
         return tuple(policies)
-
-    def _isolated(self, task: BenchmarkTask, where: str) -> Policy:
-        """Controller of a user's function, in a process of its own."""
-        forbidden: tuple[str, ...] = ()
-        if task.true_ship:
-            ships = (task.evaluation.ship, load_model(task.true_ship))
-            forbidden = tuple({model_hash(ship) for ship in ships})
-        try:
-            policy = IsolatedPolicy(self.source, task, forbidden)
-        except ContestantError as failure:
-            return LostContestant(failure)
-        if task.true_ship:
-            _check_design(policy.made.design_sha256, task, where)
-        return policy
 
     def fingerprint(self, task: BenchmarkTask) -> dict[str, str]:
         """Return the SHA-256 of each file that it is made from for a task, by path."""
@@ -252,7 +235,7 @@ def check_agents(entry: Entry, tasks: Sequence[BenchmarkTask]) -> None:
 
     Called before anything is run. Raises InputError naming the file.
     """
-    if not entry.is_text or names_code(entry.source):
+    if not entry.is_text or entry.is_code:
         return
     sources: dict[Path, Source] = {}
     refusals: list[InputError] = []

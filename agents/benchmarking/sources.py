@@ -98,6 +98,8 @@ def make_policies(source: Any, task: BenchmarkTask) -> list[Policy]:
         runs = source if isinstance(source, Sequence) else [source]
         return [make_policy(run, task) for run in runs]
 
+    if names_code(source):
+        return [make_policy(import_code(source), task)]
     if source in controller_kinds():
         return [_designed(source, task)]
     if source.startswith(TUNED):

@@ -69,14 +69,22 @@ def benchmark_command(
     allow_code: AllowCode = None,
 ) -> None:
     """Rank controllers on the tasks of a suite. All run the same episodes."""
+    from agents.benchmarking.entries import read_entries
     from agents.benchmarking.run import benchmark
-    from agents.cli.terminal import progress_bars
+    from agents.cli.terminal import progress_bars, warn
     from agents.controllers.registry import CLASSICAL
 
+    entries = read_entries(CLASSICAL if controllers is None else controllers)
+    for entry in entries:
+        if entry.is_code:
+            warn(
+                f"'{entry.source}' runs as part of this command. This is not a sandbox:"
+                " the code can read your files."
+            )
     try:
         with progress_bars() as progress:
             result = benchmark(
-                CLASSICAL if controllers is None else controllers,
+                entries,
                 suite,
                 tasks,
                 out,

@@ -213,7 +213,9 @@ def test_where_no_controller_can_run_a_task_there_are_no_results(suite, tmp_path
         words = ["--controllers", "math:sqrt", "--suite", suite, "--episodes", 1]
         answer = shipgym(*words, "--workers", 1, "--out", tmp_path / name)
         assert (answer.exit_code, answer.stdout) == (2, "")
-        assert answer.stderr.startswith(
+        warning, error = answer.stderr.splitlines()
+        assert warning.startswith("warning: 'math:sqrt' runs as part of this command")
+        assert error.startswith(
             "error: controllers: no controller could run any task; 'sqrt' in 'calm':"
             " TypeError: must be "
         )
