@@ -22,7 +22,6 @@ PACKAGES = {
     "shipgym.sea": "Current, wind and waves.",
     "shipgym.tasks": "Tasks: what an autopilot has to do in an environment.",
     "shipgym.plots": "Figures, made with plotly.",
-    "shipgym.interchange": "Trials and episodes to and from pandas and Minari.",
     "identification": "From trials to a ship model.",
     "agents": "Autopilots, and how they are run and compared.",
 }

@@ -38,7 +38,6 @@ ROOMS: dict[str, tuple[float, int, str]] = {
     "identification.report": (0.2, 1, "pages, figures, summary"),
     "identification.estimators": (1.33, 2, "LS-SVM, recursive, others"),
     "identification.samples": (4, 2, "samples, preprocessing"),
-    "shipgym.interchange": (1.75, 0, "pandas, Minari"),
     "shipgym.envs": (0.7, 0, "Gymnasium, single and vector"),
     "shipgym.pages": (4, 0, "HTML from templates"),
     "shipgym.plots": (2.8, 0, "figures"),
@@ -66,7 +65,6 @@ APART = {
 TITLES = {
     "identification.result": "result.py, fit.py",
     "shipgym.episodes": "engine/episodes.py",
-    "shipgym.interchange": "interchange.py",
     "agents.jobs": "jobs.py, job_results.py",
 }
 BACK_GROUND = {"agents": "#f6efe4", "identification": "#e9f1ea", "shipgym": "#e8eef6"}

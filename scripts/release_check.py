@@ -55,25 +55,12 @@ assert library("serial").VERSION
 assert readings(sentences("HEHDT,180.0,T").strip())[0].quantity == "heading"
 """
 LOGS = """
-from shipgym import Trial, interchange
+import pandas
+from shipgym import Trial
 trial = Trial([0.0, 1.0, 2.0], {"psi": [0.0, 0.1, 0.2]})
-assert interchange.from_frame(interchange.to_frame(trial)).sha256 == trial.sha256
-interchange.to_frame(trial).to_parquet("trial.parquet")
+frame = pandas.DataFrame({"t": trial.t, **trial.channels})
+frame.to_parquet("trial.parquet")
 assert (Trial.from_csv("trial.parquet")["psi"] == trial["psi"]).all()
-"""
-MINARI = """
-import os
-os.environ["MINARI_DATASETS_PATH"] = os.getcwd()
-import gymnasium, shipgym
-env = gymnasium.make("shipgym/CourseKeeping-v0", max_episode_steps=3)
-env = shipgym.RecordEpisode(env, "episodes")
-env.reset(seed=0)
-while not env.step(env.action_space.sample())[3]:
-    pass
-episode = shipgym.Episode.load("episodes/episode-00000.json")
-dataset = shipgym.interchange.to_minari([episode], "shipgym/tried-v0")
-(again,) = shipgym.interchange.from_minari(dataset)
-assert again.rewards.tolist() == episode.rewards.tolist()
 """
 (README,) = re.findall(
     r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL
@@ -125,7 +112,6 @@ TRIED: dict[str, tuple[str | tuple[str, ...], ...]] = {
     "fmu": (("export", "mariner", "--fmu", "mariner.fmu"),),
     "nmea": (NMEA,),
     "logs": (LOGS,),
-    "minari": (MINARI,),
     "rl": (("train", *LEARN, "--out", "run"),),
     "tune": (("tune", *LEARN, "--trials", "1", "--out", "study"),),
     "ray": ((*BENCHMARK, "results", "--engine", "ray", "--no-page"),),

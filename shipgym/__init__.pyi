@@ -1,4 +1,3 @@
-from . import interchange as interchange
 from . import manoeuvres as manoeuvres
 from . import plots as plots
 from .envs.checker import check_vector_env as check_vector_env
