@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import identification
-from identification.estimators.methods import METHODS
+from identification.models.methods import METHODS
 from identification.options import AUTO
 from identification.reading import identify_arguments, read_table, settings_of
 from shipgym import ShipFile, Trial

@@ -19,12 +19,6 @@ from .design.sensitivity import (
     sensitivity as sensitivity,
 )
 from .estimators.by_name import minimise as minimise
-from .estimators.coefficient_history import (
-    CoefficientHistory as CoefficientHistory,
-)
-from .estimators.coefficient_history import (
-    coefficient_history as coefficient_history,
-)
 from .estimators.comparators import LeastSquares as LeastSquares
 from .estimators.comparators import (
     LinearSupportVectorMachine as LinearSupportVectorMachine,
@@ -78,6 +72,12 @@ from .judging.comparison import (
     cross_validate as cross_validate,
 )
 from .judging.uncertainty import Uncertainty as Uncertainty
+from .models.coefficient_history import (
+    CoefficientHistory as CoefficientHistory,
+)
+from .models.coefficient_history import (
+    coefficient_history as coefficient_history,
+)
 from .models.prior_knowledge import PriorKnowledge as PriorKnowledge
 from .models.refinement import Refinement as Refinement
 from .options import Options as Options

@@ -9,9 +9,9 @@ import numpy as np
 import shipgym
 from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.linear import LinearRegressor
-from identification.estimators.methods import METHODS, make_method
 from identification.judging.acceptance import check_accept
 from identification.judging.uncertainty import Uncertainty
+from identification.models.methods import METHODS, make_method
 from identification.models.prior_knowledge import PriorKnowledge
 from identification.models.refinement import Refinement
 from identification.samples.preprocess import Preprocessing
@@ -42,7 +42,7 @@ class Options:
         a method other than the default is kept.
     method : str or estimator
         How the coefficients are fitted: a name of
-        `identification.estimators.methods.METHODS`, such as "tls-svm", an estimator
+        `identification.models.methods.METHODS`, such as "tls-svm", an estimator
         such as `TruncatedLSSVM(rank=12)`, a `Refinement`, or any object with
         scikit-learn's interface, `fit(X, y)` that sets `coef_`, of which each equation
         gets a copy.

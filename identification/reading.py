@@ -13,8 +13,8 @@ from dataclasses import fields
 from typing import Any
 
 from identification.estimators.kernel_residual import KernelResidual
-from identification.estimators.methods import METHODS, make_method, method_options
 from identification.judging.uncertainty import Uncertainty
+from identification.models.methods import METHODS, make_method, method_options
 from identification.models.prior_knowledge import PriorKnowledge
 from identification.models.refinement import Refinement
 from identification.options import DEFAULT_METHOD, MAP, Options

@@ -15,7 +15,7 @@ from typing import Any
 
 from griffe import Docstring, DocstringSectionKind
 
-from identification.estimators.methods import METHODS, make_method, method_options
+from identification.models.methods import METHODS, make_method, method_options
 from identification.options import Options
 from identification.reading import ARGUMENTS, STAGES, WORDS, full_name
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identification.judging.prediction import predict
+from identification.samples.prediction import predict
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships import ShipModel
 from shipgym.ships.simulate import orders, simulate

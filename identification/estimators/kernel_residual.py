@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from identification.judging.folds import FOLDS, TRIALS
+from identification.samples.folds import FOLDS, TRIALS
 from shipgym.checks import check_choice, check_number, check_whole
 
 

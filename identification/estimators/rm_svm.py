@@ -24,8 +24,8 @@ from identification.estimators.estimator import Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, validated
 from identification.estimators.pattern_search import pattern_search
 from identification.estimators.search import BAND, SearchResult
-from identification.judging.folds import FOLDS, TRIALS, held_out_rows
-from identification.judging.prediction import predict
+from identification.samples.folds import FOLDS, TRIALS, held_out_rows
+from identification.samples.prediction import predict
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, check_flag, check_number, check_whole

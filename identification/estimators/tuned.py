@@ -22,7 +22,7 @@ from identification.estimators.objectives import (
     training_error,
 )
 from identification.estimators.search import Optimiser, SearchResult
-from identification.judging.prediction import predict
+from identification.samples.prediction import predict
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_flag, check_whole

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.judging.start import with_start
+from identification.samples.prediction import with_start
 from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.manoeuvres.execution import reversals, rudder

@@ -5,12 +5,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from identification.estimators.methods import (
-    METHODS,
-    get_method,
-    make_method,
-    method_options,
-)
 from identification.judging.ranking import (
     RankedFit,
     Ranking,
@@ -25,6 +19,12 @@ from identification.judging.selection import (
     reference_of,
 )
 from identification.judging.uncertainty import Uncertainty
+from identification.models.methods import (
+    METHODS,
+    get_method,
+    make_method,
+    method_options,
+)
 from identification.options import AUTO, DEFAULT_METHOD, Options, name_of
 from identification.pipeline import identify
 from identification.progress import counted

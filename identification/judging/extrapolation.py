@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from identification.arrays import root_mean_square
-from identification.judging.prediction import predict
+from identification.samples.prediction import predict
 from shipgym import InputError, ManoeuvreError, ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats, Integers
 from shipgym.manoeuvres import turning_circle

@@ -20,12 +20,13 @@ from identification.arrays import mean_square, root_mean_square
 from identification.estimators.estimator import Estimator, Estimators, weights
 from identification.judging.closed_loop import closed_loop
 from identification.judging.covariance import residuals
-from identification.judging.predicted import (
+from identification.judging.prediction import ZIGZAG, index_reader
+from identification.samples.prediction import (
     COMPARED,
+    predict,
     predicted_channels,
     predicts_track,
 )
-from identification.judging.prediction import ZIGZAG, index_reader, predict
 from identification.samples.preprocess import smoothed_channels
 from identification.samples.preprocess.noise import noise_level
 from identification.samples.samples import Samples

@@ -1,4 +1,4 @@
-"""Predictions of recorded trials, open loop from the measured rudder, and errors."""
+"""Errors of predicted trials, and indices of their manoeuvres."""
 
 from collections.abc import Callable
 from functools import partial
@@ -6,28 +6,14 @@ from typing import Any
 
 from identification.arrays import root_mean_square
 from identification.judging.closed_loop import closed_loop
-from identification.judging.predicted import COMPARED, predicted_channels
-from identification.judging.start import with_start
-from shipgym import InputError, ShipModel, Trial, UnstableModelError
+from identification.samples.prediction import COMPARED, predicted_channels
+from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import switch_heading_deg, turning_indices, zigzag_indices
-from shipgym.ships.simulate import open_loop
 
 ZIGZAG = ("overshoot_1_deg", "overshoot_2_deg")
 
 #: From a run of a trial's manoeuvre, or None for one that ran away, to its indices.
 IndexReader = Callable[[Trial | None], Any]
-
-
-def predict(model: ShipModel, trial: Trial) -> Trial | None:
-    """Simulate a trial from its initial state and measured rudder.
-
-    Initial velocities that were derived are estimated (`with_start`). None if the model
-    runs away.
-    """
-    try:
-        return open_loop(model, with_start(model, trial))
-    except UnstableModelError:
-        return None
 
 
 def trial_metrics(

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from identification.estimators.methods import fit_all, get_method
 from identification.judging.covariance import joint_covariance
 from identification.judging.guard import with_coefficients
 from identification.judging.model_error import (
@@ -19,6 +18,7 @@ from identification.judging.model_error import (
     FEWEST_TRIALS,
     without_trial,
 )
+from identification.models.methods import fit_all, get_method
 from identification.samples.problem import Problem
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats

@@ -8,9 +8,6 @@ import numpy as np
 
 from identification.arrays import root_mean_square
 from identification.judging.extrapolation import holds_turn, largest_rudders
-from identification.judging.folds import pieces
-from identification.judging.predicted import predicts_track
-from identification.judging.prediction import predict
 from identification.judging.ranking import RankedFit, fit_name
 from identification.judging.rudder_bias import with_bias
 from identification.judging.usual_hull import with_usual_hull
@@ -19,6 +16,8 @@ from identification.models.similarity import AUTO
 from identification.options import MAP, Options, name_of
 from identification.progress import counted
 from identification.result import IdentificationResult
+from identification.samples.folds import pieces
+from identification.samples.prediction import predict, predicts_track
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.arrays import Integers
 from shipgym.ships.structures import GREY_BOX, MMG

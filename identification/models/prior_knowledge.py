@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.judging.folds import FOLDS, TRIALS
+from identification.samples.folds import FOLDS, TRIALS
 from shipgym import InputError, ShipModel
 from shipgym.checks import check_choice, check_number
 

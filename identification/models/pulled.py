@@ -13,12 +13,12 @@ import numpy as np
 
 from identification.arrays import by_name, mean_square
 from identification.estimators.estimator import Estimator, Estimators, FitTask
-from identification.estimators.methods import Method
-from identification.judging.folds import TRIALS, Fold, sample_folds
 from identification.judging.guard import reasons_unstable, with_coefficients
 from identification.models.formulas import FORMULAS
+from identification.models.methods import Method
 from identification.models.prior import Prior, formula_prior, reference_prior
 from identification.models.prior_knowledge import PriorKnowledge
+from identification.samples.folds import TRIALS, Fold, sample_folds
 from identification.samples.samples import Samples
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats

@@ -25,8 +25,7 @@ from identification.judging.model_error import (
     model_error,
     without_trial,
 )
-from identification.judging.predicted import is_yaw_alone
-from identification.judging.prediction import predict, trial_metrics
+from identification.judging.prediction import trial_metrics
 from identification.judging.rudder_bias import rudder_bias
 from identification.judging.uncertainty import Uncertainty
 from identification.options import (
@@ -36,6 +35,7 @@ from identification.options import (
     whole_call,
 )
 from identification.result import IdentificationResult
+from identification.samples.prediction import is_yaw_alone, predict
 from identification.samples.problem import Problem
 from identification.samples.samples import Samples
 from shipgym import ShipModel, Trial
@@ -324,9 +324,7 @@ def _accuracy(
         for trial in trials
     }
     if isinstance(problem.table, GreyBox):
-        from identification.samples.grey_box import bare_metrics
-
-        metrics["reference"] = bare_metrics(model, trials)
+        metrics["reference"] = _bare_metrics(model, trials)
     return metrics
 
 
@@ -341,3 +339,19 @@ def _stability(provenance: Mapping[str, Any], lost: list[str]) -> dict[str, Any]
         reasons = guard.get("rejected", [])
     causes = "; ".join(reasons)
     return {"stable": False, "instability": f"runs away: {causes}"}
+
+
+def _bare_metrics(model: ShipModel, trials: Sequence[Trial]) -> dict[str, Any]:
+    """Score the predictions of trials by the reference ship of a grey box alone.
+
+    Returns her name and the `trial_metrics` by trial.
+    """
+    box = model.table
+    assert isinstance(box, GreyBox)
+    no_correction = dict.fromkeys(model.coefficients, 0.0)
+    bare = replace(model, coefficients=no_correction, covariance=None, draws=None)
+    metrics = {}
+    for trial in trials:
+        predicted = predict(bare, trial)
+        metrics[trial.name] = trial_metrics(bare, trial, predicted)
+    return {"name": box.ship.name, "trials": metrics}

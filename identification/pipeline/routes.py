@@ -8,18 +8,19 @@ from functools import cached_property
 from typing import Any
 
 from identification.estimators.estimator import Estimators
-from identification.estimators.kernel_fit import (
+from identification.estimators.kernel_residual import KernelResidual
+from identification.estimators.rm_svm import RMSVM
+from identification.judging.extrapolation import beyond_trials
+from identification.judging.guard import GuardedFit, reasons_unstable
+from identification.judging.selection import select
+from identification.models.grey_box import explained_samples
+from identification.models.kernel_fit import (
     INPUT_CHANNELS,
     KernelFit,
     fit_kernel,
     inputs_of,
     stabilised,
 )
-from identification.estimators.kernel_residual import KernelResidual
-from identification.estimators.rm_svm import RMSVM
-from identification.judging.extrapolation import beyond_trials
-from identification.judging.guard import GuardedFit, reasons_unstable
-from identification.judging.selection import select
 from identification.models.maximum_a_posteriori import (
     MMGFit,
     checked_mmg,
@@ -36,10 +37,10 @@ from identification.pipeline.evaluation import (
     provenance_of,
     with_uncertainty,
 )
+from identification.pipeline.pose import pose
 from identification.result import IdentificationResult
-from identification.samples.grey_box import explained_samples
 from identification.samples.preprocess import smoothed_channels
-from identification.samples.problem import Problem, held_out, pose
+from identification.samples.problem import Problem, held_out
 from identification.samples.still_water import in_still_water
 from shipgym import InputError, ShipModel, Trial
 from shipgym.checks import quoted

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from identification.estimators.coefficient_history import coefficient_history
 from identification.estimators.recursive import MultiInnovationLeastSquares
-from identification.judging.prediction import predict
+from identification.models.coefficient_history import coefficient_history
+from identification.samples.prediction import predict
 from papers import (
     cao2015,
     comparators,

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification import RMSVM
-from identification.estimators.methods import fit_all, get_method
-from identification.judging.folds import LARGEST_RUDDER, TRIALS
 from identification.judging.guard import with_coefficients
+from identification.models.methods import fit_all, get_method
 from identification.models.similarity import select_reference
 from identification.pipeline import identify
 from identification.result import IdentificationResult
+from identification.samples.folds import LARGEST_RUDDER, TRIALS
 from identification.samples.samples import build_samples
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices

@@ -15,8 +15,8 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.estimators.coefficient_history import coefficient_history
 from identification.estimators.recursive import MultiInnovationLeastSquares
+from identification.models.coefficient_history import coefficient_history
 from identification.pipeline import identify
 from papers.row import Conclusion, Paper, Row
 from papers.song2020_container import container_rows

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from identification import Preprocessing
-from identification.judging.prediction import predict
 from identification.pipeline import identify
+from identification.samples.prediction import predict
 from real_ships.data import Data, MeasuredShip
 from real_ships.measures import Floats
 from real_ships.section import Section, number, table

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from identification.judging.guard import reasons_unstable
-from identification.judging.prediction import predict
 from identification.pipeline import identify
+from identification.samples.prediction import predict
 from real_ships.data import Data, MeasuredShip
 from real_ships.measures import (
     MEASURES,

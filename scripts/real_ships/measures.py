@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.judging.prediction import predict, trial_metrics
+from identification.judging.prediction import trial_metrics
+from identification.samples.prediction import predict
 from real_ships.section import number
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import TurningIndices, turning_circle, turning_indices

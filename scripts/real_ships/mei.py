@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from identification.judging.prediction import predict, trial_metrics
+from identification.judging.prediction import trial_metrics
 from identification.pipeline import identify
+from identification.samples.prediction import predict
 from real_ships.data import Data, MeasuredShip
 from real_ships.marin import MEASURED_ROW, SHIP, TURNS, painter
 from real_ships.measures import (

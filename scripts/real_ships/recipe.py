@@ -14,8 +14,8 @@ import numpy as np
 
 from identification import PriorKnowledge, Refinement
 from identification.estimators.estimator import FitTask
-from identification.estimators.methods import get_method
 from identification.judging.guard import reasons_unstable, with_coefficients
+from identification.models.methods import get_method
 from identification.models.prior import Prior, reference_prior
 from identification.models.pulled import Pulled
 from identification.pipeline import identify

@@ -16,8 +16,8 @@ from agents.identifying import (
     identify_ship,
     reduce_ship,
 )
-from identification.estimators.methods import METHODS
 from identification.judging import selection
+from identification.models.methods import METHODS
 from identification.reading import ARGUMENTS, stage_settings
 from shipgym import InputError, ShipFile, list_structures, load_model
 

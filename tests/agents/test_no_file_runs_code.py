@@ -17,7 +17,7 @@ from agents.identifying import identification_settings
 from agents.suites.suite import parse_suite
 from agents.training.request import TrainingRequest, make_plan
 from agents.training.run_folder import RUN, begin_folder, read_plan
-from identification.samples.grey_box import chosen_box
+from identification.models.grey_box import chosen_box
 from shipgym import InputError, ShipFile, ShipModel, load_model
 from shipgym.envs.registration import check_named
 from shipgym.pages.templates import environment

@@ -7,7 +7,6 @@ import pytest
 
 from identification import Samples, identify
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
-from identification.estimators.methods import fit_all, get_method
 from identification.judging.bootstrap import (
     bootstrap_covariance,
     influence_covariance,
@@ -15,6 +14,7 @@ from identification.judging.bootstrap import (
     rows_in,
 )
 from identification.judging.covariance import joint_covariance
+from identification.models.methods import fit_all, get_method
 from shipgym import InputError, ShipModel, Trial
 
 

@@ -13,8 +13,8 @@ import pytest
 
 from identification import Comparison, compare_methods, cross_validate
 from identification.judging.comparison import COMPARISON_FILES, fit_pairs
-from identification.judging.folds import held_out_rows
 from identification.report.comparison import comparison_page, headings_figure
+from identification.samples.folds import held_out_rows
 from identification.samples.samples import build_samples
 from shipgym import InputError, ShipModel, Trial
 from shipgym.ships.structures import get_structure

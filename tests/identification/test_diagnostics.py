@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from identification import LSSVM, IdentificationResult, Samples, identify
-from identification.judging.checks import check_trials, is_still
 from identification.judging.diagnostics import (
     autocorrelation,
     diagnose,
     variance_inflation,
     without_overlap,
 )
+from identification.samples.checks import check_trials, is_still
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import get_structure

@@ -13,7 +13,7 @@ import shipgym
 from identification import RMSVM, IdentificationResult, identify
 from identification.estimators.pattern_search import pattern_search
 from identification.estimators.rm_svm import heading_error, most_regularised
-from identification.judging.folds import of_largest_rudder
+from identification.models.grey_box import chosen_box
 from identification.models.similarity import (
     check_alike,
     correlations,
@@ -21,7 +21,7 @@ from identification.models.similarity import (
     similarity_vector,
 )
 from identification.report.choice_figures import search_figure
-from identification.samples.grey_box import chosen_box
+from identification.samples.folds import of_largest_rudder
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag

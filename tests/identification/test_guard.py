@@ -11,7 +11,6 @@ import pytest
 import shipgym
 from identification import IdentificationResult, Samples, identify
 from identification.estimators.estimator import FitTask
-from identification.estimators.methods import fit_held, get_method
 from identification.judging.guard import (
     Simulation,
     guarded_fit,
@@ -20,6 +19,7 @@ from identification.judging.guard import (
     why_unphysical,
 )
 from identification.judging.hard_turn import hard_turn_features
+from identification.models.methods import fit_held, get_method
 from shipgym import ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import get_structure

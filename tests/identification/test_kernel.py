@@ -19,7 +19,7 @@ from identification import (
     Options,
     identify,
 )
-from identification.estimators.kernel_fit import (
+from identification.models.kernel_fit import (
     chosen_centres,
     principal,
     stabilised,

@@ -23,13 +23,13 @@ from identification import (
     identify,
 )
 from identification.estimators.l_curve import LCurve, corner_rank, gcv_rank
-from identification.estimators.methods import (
+from identification.estimators.tuned import free_running_error
+from identification.models.methods import (
     METHODS,
     get_method,
     make_method,
     without_constant,
 )
-from identification.estimators.tuned import free_running_error
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 

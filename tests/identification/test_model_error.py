@@ -9,7 +9,6 @@ import pytest
 from certainty import case
 
 from identification import IdentificationResult, Samples, Uncertainty, identify
-from identification.estimators.methods import fit_all, get_method
 from identification.estimators.rm_svm import RMSVM
 from identification.judging.closed_loop import closed_loop, legs
 from identification.judging.model_error import (
@@ -22,9 +21,10 @@ from identification.judging.model_error import (
     scale_of,
     without_trial,
 )
-from identification.judging.prediction import predict
 from identification.judging.warnings import held_out_error
-from identification.samples.grey_box import chosen_box
+from identification.models.grey_box import chosen_box
+from identification.models.methods import fit_all, get_method
+from identification.samples.prediction import predict
 from shipgym import InputError, ShipModel, Trial, load_model
 from shipgym.manoeuvres import zigzag, zigzag_indices
 from shipgym.ships.simulate import simulate

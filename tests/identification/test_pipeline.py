@@ -21,7 +21,7 @@ from identification import (
     identify,
 )
 from identification.options import changed_settings, name_of, plain
-from identification.samples.problem import pose
+from identification.pipeline.pose import pose
 from shipgym import InputError, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
 from shipgym.ships.simulate import open_loop

@@ -12,7 +12,6 @@ import pytest
 import shipgym
 from identification import IdentificationResult, PriorKnowledge, identify
 from identification.estimators.lssvm import TruncatedLSSVM
-from identification.judging.folds import sample_folds
 from identification.models.formulas import (
     clarke_derivatives,
     formula_coefficients,
@@ -29,6 +28,7 @@ from identification.models.pulled import (
     relative_error,
     strongest_as_good,
 )
+from identification.samples.folds import sample_folds
 from identification.samples.samples import build_samples
 from shipgym import Particulars, ShipModel, Trial
 from shipgym.errors import InputError

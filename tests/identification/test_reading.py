@@ -17,7 +17,7 @@ from identification import (
     TruncatedLSSVM,
     Uncertainty,
 )
-from identification.estimators.methods import METHODS, method_options
+from identification.models.methods import METHODS, method_options
 from identification.reading import (
     ARGUMENTS,
     STAGES,

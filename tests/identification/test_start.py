@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.judging.prediction import predict
-from identification.judging.start import with_start
+from identification.samples.prediction import predict, with_start
 from shipgym import Trial, load_model
 from shipgym.manoeuvres import turning_circle, zigzag
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from identification import Samples, build_samples
-from identification.estimators.methods import fit_all, get_method
 from identification.judging.covariance import (
     coefficient_covariance,
     effective_freedom,
     joint_covariance,
     newey_west,
 )
+from identification.models.methods import fit_all, get_method
 from shipgym import ShipModel, Trial
 
 

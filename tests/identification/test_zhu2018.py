@@ -10,7 +10,7 @@ from papers.zhu2018 import (
 )
 from papers.zhu2018.fits import SEARCHES
 
-from identification.judging.prediction import predict
+from identification.samples.prediction import predict
 
 
 def test_training_error_drives_c_to_its_bound_which_is_what_the_thesis_prints():

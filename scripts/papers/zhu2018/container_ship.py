@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.tuned import TunedLSSVM
-from identification.judging.prediction import predict
+from identification.samples.prediction import predict
 from papers.row import COMPUTED, ELSEWHERE, PICKED, Row
 from papers.zhu2018.fits import (
     MOST_C,

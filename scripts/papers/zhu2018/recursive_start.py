@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.recursive import RecursiveLeastSquares
-from identification.judging.prediction import predict
 from identification.pipeline import identify
+from identification.samples.prediction import predict
 from identification.samples.samples import build_samples
 from papers.row import ELSEWHERE, Row
 from papers.zhu2018.fits import every

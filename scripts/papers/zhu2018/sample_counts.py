@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimators.tuned import TunedLSSVM
-from identification.judging.prediction import predict
+from identification.samples.prediction import predict
 from papers.row import Row
 from papers.zhu2018.container_ship import (
     EQUATIONS,

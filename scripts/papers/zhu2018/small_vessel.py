@@ -16,8 +16,8 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from identification import Refinement
-from identification.judging.prediction import predict
 from identification.pipeline import identify
+from identification.samples.prediction import predict
 from papers.row import Row
 from papers.zhu2018.fits import (
     Difference,

@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from identification.estimators.lssvm import LSSVM
-from identification.judging.prediction import predict
+from identification.samples.prediction import predict
 from papers.row import COMPUTED, ELSEWHERE, Row
 from papers.zhu2018.container_ship import (
     OTHER_TERMS,

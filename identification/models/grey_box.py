@@ -1,7 +1,4 @@
-"""Grey boxes: their reference ship, and how well she alone predicts.
-
-And the regression of a model on its own accelerations.
-"""
+"""The reference ship of a grey box, and the regression of a model on itself."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -11,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from identification.estimators.estimator import Estimator
-from identification.estimators.methods import fit_all, get_method
-from identification.judging.prediction import predict, trial_metrics
+from identification.models.methods import fit_all, get_method
 from identification.models.similarity import (
     AUTO,
     check_alike,
@@ -109,19 +105,3 @@ def explained_samples(
     for estimator in estimators.values():
         estimator.coef_ = np.ones(1)
     return samples, estimators
-
-
-def bare_metrics(model: ShipModel, trials: Sequence[Trial]) -> dict[str, Any]:
-    """Score the predictions of trials by the reference ship of a grey box alone.
-
-    Returns her name and the `trial_metrics` by trial.
-    """
-    box = model.table
-    assert isinstance(box, GreyBox)
-    no_correction = dict.fromkeys(model.coefficients, 0.0)
-    bare = replace(model, coefficients=no_correction, covariance=None, draws=None)
-    metrics = {}
-    for trial in trials:
-        predicted = predict(bare, trial)
-        metrics[trial.name] = trial_metrics(bare, trial, predicted)
-    return {"name": box.ship.name, "trials": metrics}

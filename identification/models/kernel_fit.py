@@ -20,7 +20,7 @@ from identification.estimators.estimator import Estimators
 from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.rm_svm import heading_error, most_regularised
-from identification.judging.folds import held_out_rows
+from identification.samples.folds import held_out_rows
 from identification.samples.samples import Samples
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats, finite

@@ -1,13 +1,51 @@
-"""The state at which a prediction starts where the record derived its velocities."""
+"""Predictions of recorded trials, open loop from the measured rudder.
+
+And the state from which they start where the record derived its velocities.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from identification.judging.predicted import is_yaw_alone
 from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.ships.simulate import open_loop
+
+COMPARED = ("u", "v", "r", "psi")
+
+
+def predicted_channels(model: ShipModel) -> tuple[str, ...]:
+    """Channels of `COMPARED` that a model's equations predict.
+
+    A velocity without an equation keeps its first value, so its error says nothing
+    about the coefficients. The heading is the integral of the yaw rate.
+    """
+    equations = set(getattr(model.dynamics, "equations", "uvr"))
+    if "r" in equations:
+        equations.add("psi")
+    return tuple(name for name in COMPARED if name in equations)
+
+
+def predicts_track(model: ShipModel) -> bool:
+    """Return True if speed and drift are predicted, as a track needs."""
+    return {"u", "v"}.issubset(predicted_channels(model))
+
+
+def is_yaw_alone(model: ShipModel) -> bool:
+    """Return True where nothing but yaw rate and heading is predicted."""
+    return predicted_channels(model) == ("r", "psi")
+
+
+def predict(model: ShipModel, trial: Trial) -> Trial | None:
+    """Simulate a trial from its initial state and measured rudder.
+
+    Initial velocities that were derived are estimated (`with_start`). None if the model
+    runs away.
+    """
+    try:
+        return open_loop(model, with_start(model, trial))
+    except UnstableModelError:
+        return None
 
 
 def with_start(model: ShipModel, trial: Trial) -> Trial:

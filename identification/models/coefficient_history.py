@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from sklearn.base import clone
 
-from identification.estimators.methods import get_method
 from identification.estimators.recursive import Recursion
+from identification.models.methods import get_method
 from identification.samples.samples import Samples, build_samples
 from shipgym import InputError, Particulars, Trial
 from shipgym.arrays import Floats, Integers
