@@ -34,9 +34,12 @@ from typing import Any
 import numpy as np
 from foreign_ships import KeptRows, Row, identified, sea_trials, ship_names, with_shaft
 
-from identification.judging.predicted import predicted_channels, predicts_track
-from identification.judging.prediction import predict
 from identification.judging.selection import STRUCTURES
+from identification.samples.prediction import (
+    predict,
+    predicted_channels,
+    predicts_track,
+)
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.manoeuvres import (
