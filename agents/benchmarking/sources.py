@@ -23,7 +23,7 @@ from shipgym.errors import InputError
 from shipgym.files import LARGEST_TENSORS, read_bytes
 from shipgym.python_files import working_folder
 
-LEARNED = ("ppo", "sac", "td3", "tqc", "cma-es")
+LEARNED = ("ppo", "sac", "td3", "tqc")
 TUNED = "tuned-"
 BEST_KNOWN = "best-known"
 

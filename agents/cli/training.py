@@ -29,9 +29,7 @@ if TYPE_CHECKING:
     from agents.training.result import TrainingResult
     from agents.training.tuning import TuningResult, TuningTrial
 
-Algorithm = Annotated[
-    str, Argument(metavar="ALGORITHM", help="ppo, sac, td3, tqc or cma-es.")
-]
+Algorithm = Annotated[str, Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")]
 Environment = Annotated[
     str | None,
     Option(

@@ -38,7 +38,7 @@ class TrainingPlan:
 
     Attributes
     ----------
-    algorithm : {"ppo", "sac", "td3", "tqc", "cma-es"}
+    algorithm : {"ppo", "sac", "td3", "tqc"}
     task : BenchmarkTask
         Environment, model and options; evaluation is on it as it is.
     settings : LearningSettings
@@ -81,7 +81,7 @@ class TrainingPlan:
         action = self.task.task.action
         base = self.settings.base
         check_choice(action, OUTPUTS, "action")
-        if action == "rudder-discrete" and self.algorithm not in ("ppo", "cma-es"):
+        if action == "rudder-discrete" and self.algorithm != "ppo":
             raise InputError(
                 f"action: expected one that {self.algorithm} learns, got '{action}';"
                 " take ppo"

@@ -27,7 +27,7 @@ class TrainingRequest:
 
     Attributes
     ----------
-    algorithm : {"ppo", "sac", "td3", "tqc", "cma-es"}
+    algorithm : {"ppo", "sac", "td3", "tqc"}
     environment : str
         As `read_environment` takes it.
     model : str

@@ -37,7 +37,6 @@ PACKAGES = (
     "torch",
     "stable-baselines3",
     "sb3-contrib",
-    "cma",
 )
 CONFIGURATION: Shape = {
     "algorithm": (str,),

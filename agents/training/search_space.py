@@ -31,13 +31,6 @@ def search_space(algorithm: str, fixed: Sequence[str] = ()) -> dict[str, Any]:
             "one_minus_gamma": real(1e-3, 0.1, log=True),
             "net_arch": choice(["32 32", "64 64", "128 128"]),
         }
-    if algorithm == "cma-es":
-        space |= {
-            "net_arch": choice(["", "8", "16", "8 8"]),  # the first is linear
-            "population": choice([12, 24, 48]),
-            "episodes": choice([8, 16, 32]),
-            "sigma": real(0.02, 0.5, log=True),
-        }
     space |= {
         "activation": choice(["relu", "tanh"]),
         "action_repeat": choice([1, 4, 16]),

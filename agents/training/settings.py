@@ -279,40 +279,12 @@ class TQCSettings(SACSettings):
             )
 
 
-@dataclass(frozen=True)
-class CMASettings(LearningSettings):
-    """Evolution strategy with covariance matrix adaptation (Hansen 2016).
-
-    Source: The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772.
-    """
-
-    population: int = setting(
-        "networks that are tried in a generation", at_least=4, at_most=SEEDS_EACH
-    )
-    episodes: int = setting(
-        "episodes that each of them is tried on, the same for all of a generation and"
-        " others in the next",
-        at_least=1,
-        at_most=SEEDS_EACH,
-    )
-    sigma: float = setting(
-        "standard deviation of the weights in the first generation, in units of one"
-        " over the square root of a layer's inputs",
-        above=0.0,
-        at_most=10.0,
-    )
-
-    def _check_together(self) -> None:
-        """All settings fit each other."""
-
-
 #: Settings by algorithm.
 ALGORITHMS: Mapping[str, type[LearningSettings]] = {
     "ppo": PPOSettings,
     "sac": SACSettings,
     "td3": TD3Settings,
     "tqc": TQCSettings,
-    "cma-es": CMASettings,
 }
 
 
@@ -374,7 +346,7 @@ def load_settings(
 
     Parameters
     ----------
-    algorithm : {"ppo", "sac", "td3", "tqc", "cma-es"}
+    algorithm : {"ppo", "sac", "td3", "tqc"}
     environment : str
         "course-keeping", "path-following", or the path of a task's file.
     task : str

@@ -18,7 +18,6 @@ from agents.training.learner import Learner
 from agents.training.nested_values import read_values, write_values
 from agents.training.plan import EVALUATION_SEED, TrainingPlan
 from agents.training.result import TrainingProgress, TrainingResult
-from agents.training.settings import GradientSettings
 from shipgym.errors import InputError
 from shipgym.files import write_json
 
@@ -216,11 +215,6 @@ def make_learner(
 
     Raises InputError if a package that it needs is not installed.
     """
-    if isinstance(plan.settings, GradientSettings):
-        from agents.training.gradient_learner import GradientLearner
+    from agents.training.gradient_learner import GradientLearner
 
-        return GradientLearner(plan, base, folder)
-
-    from agents.training.evolution import EvolutionLearner
-
-    return EvolutionLearner(plan, base)
+    return GradientLearner(plan, base, folder)

@@ -36,9 +36,6 @@ SMALL = "--set ships=2 --set n_steps=16 --set batch_size=16 --set evaluate_every
 TASK_OF_OWN = (
     "--env course-keeping --model mariner --sea calm --option episode_steps=20"
 )
-GENERATIONS = (
-    "--set population=4 --set episodes=2 --set evaluate_every=100 --total-steps 200"
-)
 LEARNING = "--settings ppo.toml --total-steps 32"
 PILOT = (
     "--nmea udp:127.0.0.1:0 --gear udp:127.0.0.1:9 --duration 0.5 --speed-up 10 --limit"
@@ -102,10 +99,6 @@ LINES = (
         " --engine local --workers 1 --out study",
         0,
     ),
-    (f"train cma-es {TASK_OF_OWN} {GENERATIONS} --threads 2 --out evolved", 0),
-    ("train cma-es --resume --max-seconds 60 --out evolved", 0),
-    ("export evolved/agent.json --c evolved-c", 0),
-    (f"tune cma-es {TASK_OF_OWN} {GENERATIONS} --trials 1 --out study3", 0),
     (f"tune ppo {TASK} --address 127.0.0.1:9 --out study2", 2),
     (
         "benchmark --controllers pid,lq --suite small.toml --tasks calm --episodes 2"

@@ -72,9 +72,6 @@ BOUNDS = [
     ("tqc", "n_quantiles", 3, 2),
     ("tqc", "top_quantiles_to_drop", 0, -1),
     ("tqc", "top_quantiles_to_drop", 24, 25),
-    ("cma-es", "population", 4, 3),
-    ("cma-es", "episodes", 1000, 1001),
-    ("cma-es", "sigma", 1e-9, 0.0),
 ]
 
 

@@ -59,7 +59,6 @@ TINY = {
     "sac": OFF_POLICY,
     "td3": OFF_POLICY,
     "tqc": OFF_POLICY,
-    "cma-es": {"base": "none", "population": 4, "episodes": 2, "total_steps": 600},
 }
 SHORT = {"episode_steps": 20, "change_interval_steps": 10}
 OPTIONS = [f"--option={name}={value}" for name, value in SHORT.items()]
@@ -119,7 +118,6 @@ def stopping_at(steps):
         ("sac", {"reward_scale": 10.0}),
         ("td3", {"buffer_size": 80}),
         ("tqc", {"base": "lq", "ent_coef": 0.1}),
-        ("cma-es", {"base": "lq", "net_arch": [4]}),
     ],
 )
 def test_a_killed_run_ends_as_one_that_was_not(algorithm, settings, tmp_path):
@@ -544,8 +542,6 @@ def test_a_training_learns_whole_rollouts():
         ("ppo --task sharp-trns", "Did you mean 'sharp-turns'?"),
         ("ppo --env curse-keeping", "Did you mean 'course-keeping'?"),
         ("ppo --set gama=0.9", "Did you mean 'gamma'?"),
-        ("cma-es --set gamma=0.9", "settings of cma-es: unknown key 'gamma'"),
-        ("cma-es --set population=3", "population: expected an integer of at least 4"),
         ("ppo --threads 1025", "threads: expected an integer of at least 1 and"),
         ("ppo --set gamma=nan", "--set gamma: expected a number of magnitude"),
         ("ppo --set gamma=2", "gamma: expected a number >= 0 and <= 1"),

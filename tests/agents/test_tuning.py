@@ -214,8 +214,7 @@ def test_whatever_is_proposed_are_valid_settings(algorithm):
             else:
                 parameters[name] = draw.uniform(dimension.low, dimension.high)
         found = with_parameters(settings, parameters)
-        if algorithm != "cma-es":
-            assert found.gamma == 1.0 - parameters["one_minus_gamma"]
+        assert found.gamma == 1.0 - parameters["one_minus_gamma"]
         n_layers = len(parameters["net_arch"].split())
         assert len(found.net_arch) == n_layers
 
