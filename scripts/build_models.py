@@ -1,6 +1,6 @@
 """Identify the models in the box, from recorded or simulated noisy trials.
 
-    python scripts/build_models.py [name ...]     write to shipgym/ships/library
+    python scripts/build_models.py [name ...]     write to shipgym/models/library
     python scripts/build_models.py --check        compare with what is there
     python scripts/build_models.py --tables       tables of docs/identified_models.md
     python scripts/build_models.py --candidates   what was looked at to choose
@@ -36,7 +36,7 @@ from shipgym.manoeuvres import (
     zigzag_indices,
 )
 from shipgym.manoeuvres.registry import standard_time
-from shipgym.ships.catalogue import LIBRARY
+from shipgym.models.catalogue import LIBRARY
 from shipgym.trials.sensors import Sensors
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

@@ -28,7 +28,7 @@ from agents.export.fmu import write_fmu
 from agents.export.ship_c99 import ship_source
 from agents.export.simulated import SimulatedShip, simulate_ship
 from agents.export.steering import steer
-from shipgym.ships import load_model
+from shipgym.models import load_model
 
 CROSS = ("arm-linux-gnueabihf-gcc", "aarch64-linux-gnu-gcc")
 QEMU = {"arm-linux-gnueabihf-gcc": "qemu-arm", "aarch64-linux-gnu-gcc": "qemu-aarch64"}

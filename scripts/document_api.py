@@ -17,7 +17,8 @@ PAGES = ROOT / "docs" / "api"
 #: Packages, in the order of the site, with what each is for.
 PACKAGES = {
     "shipgym": "Trials, ships, manoeuvres, weather and environments.",
-    "shipgym.ships": "Ship models, structures and their terms.",
+    "shipgym.models": "Ship models by name, from files and from other ships.",
+    "shipgym.ships": "Structures, their terms and equations of ships.",
     "shipgym.manoeuvres": "Standard manoeuvres, their indices and criteria.",
     "shipgym.sea": "Current, wind and waves.",
     "shipgym.tasks": "Tasks: what an autopilot has to do in an environment.",

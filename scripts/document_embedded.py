@@ -20,7 +20,7 @@ from agents import LQ, LQG, PID, AdaptiveLineOfSight, TurnRate, WheelOver, load_
 from agents.export.autopilot_c99 import autopilot_source
 from agents.export.c99 import Source
 from agents.export.ship_c99 import ship_source
-from shipgym.ships import load_model
+from shipgym.models import load_model
 
 PAGE = Path(__file__).parents[1] / "docs" / "embedded.md"
 TARGET = ["-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"]

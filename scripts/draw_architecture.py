@@ -46,7 +46,8 @@ ROOMS: dict[str, tuple[float, int, str]] = {
     "shipgym.instruments": (0.2, 2, "what sensors show"),
     "shipgym.tasks": (1.3, 2, "aims, rewards, observations"),
     "shipgym.sea": (2, 3, "current, wind, waves"),
-    "shipgym.ships": (3, 3, "models, reference ships"),
+    "shipgym.models": (3, 2, "ship models, simulated"),
+    "shipgym.ships": (3, 3, "equations, reference ships"),
     "shipgym.trials": (4, 3, "recorded manoeuvres"),
     "shipgym.engine": (2.5, 4, "records, integrator, compiler"),
 }

@@ -23,7 +23,7 @@ from agents import PID
 from agents.export.helm import Helm
 from agents.export.nmea import sentences
 from agents.export.sensors import Limits
-from shipgym.ships import load_model
+from shipgym.models import load_model
 
 HOST = "127.0.0.1"
 

@@ -14,7 +14,7 @@ from inspect import (
 from pathlib import Path
 from sysconfig import get_path
 from traceback import extract_tb
-from types import FunctionType, ModuleType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 from shipgym.errors import InputError
@@ -159,3 +159,11 @@ def place_of(function: Any, error: BaseException | None = None) -> str:
             line = frame.lineno or line
             name = frame.name
     return f"{file}, line {line}, in {name}"
+
+
+def nested_code(code: CodeType) -> Iterator[CodeType]:
+    """The code of a function and of those within it, comprehensions among them."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from nested_code(constant)

@@ -155,7 +155,7 @@ def _source(what: str, name: str | None, depth: float, real: str) -> Source:
     from agents.export.ship_c99 import ship_source
     from shipgym.errors import InputError
     from shipgym.files import read_json
-    from shipgym.ships import load_model
+    from shipgym.models import load_model
 
     file = Path(what)
     is_agent = what in list_pretrained()

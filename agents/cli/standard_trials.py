@@ -13,7 +13,7 @@ from shipgym.manoeuvres.imo import imo_criteria
 from shipgym.manoeuvres.intervals import intervals_of
 from shipgym.manoeuvres.spirals import Spiral
 from shipgym.manoeuvres.standard import families_of
-from shipgym.ships import ShipModel
+from shipgym.models import ShipModel
 from shipgym.trials.trial import Trial
 
 

@@ -241,7 +241,7 @@ def simulate_command(
     from agents.export.simulated import STEP, SimulatedShip, simulate_ship
     from shipgym.checks import check_number
     from shipgym.files import named_values
-    from shipgym.ships import load_model
+    from shipgym.models import load_model
 
     dropped = {}
     for kind, after in named_values(drop or (), "--drop", "HDT=60").items():

@@ -37,7 +37,7 @@ def trials_command(
     from agents.cli.terminal import answer, progress_bars
     from agents.cli.trials_page import write_page
     from agents.output import check_page
-    from shipgym.ships import load_model
+    from shipgym.models import load_model
 
     ship = load_model(model)
     water_depth = inf if depth is None else depth

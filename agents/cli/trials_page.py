@@ -8,9 +8,9 @@ from agents.verification.figures import criterion_name
 from shipgym.files import write_text
 from shipgym.manoeuvres.spirals import Spiral
 from shipgym.manoeuvres.standard import FAMILIES, Manoeuvre
+from shipgym.models import ShipModel
 from shipgym.pages import render
 from shipgym.plots import history_figure, manoeuvre_figure, path_figure, pull_out_figure
-from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
 
 #: Name in the page, plotly figure, and caption.

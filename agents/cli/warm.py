@@ -42,7 +42,7 @@ def warm_command(
     from agents.cli.terminal import answer, say
     from shipgym.engine.cache_folder import usable_folder
     from shipgym.errors import InputError
-    from shipgym.ships import load_model
+    from shipgym.models import load_model
 
     folder = usable_folder()
     if folder is None:
@@ -84,7 +84,7 @@ def _compile(what: str, compile_it: Callable[[], Any]) -> None:
 def warm_names(wanted: list[str] | None, everything: bool) -> list[str]:
     """Environments and models to compile; by default both tasks and the Mariner."""
     from shipgym.envs.registration import ENVIRONMENTS, env_id
-    from shipgym.ships import list_models
+    from shipgym.models import list_models
     from shipgym.tasks.definition import TASKS
 
     if everything:

@@ -15,7 +15,7 @@ from agents.controllers.interface import Policy, check_names, check_scales
 from shipgym import InputError, ShipModel
 from shipgym.checks import check_whole
 from shipgym.envs.engine import Engine
-from shipgym.ships.by_name import ship_of
+from shipgym.models.by_name import ship_of
 from shipgym.tasks.task import Task, course_keeping_task
 
 Observations = NDArray[np.float32]

@@ -39,7 +39,7 @@ from shipgym import ShipModel
 from shipgym.arrays import Flags, Floats, finite
 from shipgym.engine.records import Record, leaves
 from shipgym.files import write_json
-from shipgym.ships.linear import nomoto_of
+from shipgym.models.linear import nomoto_of
 from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
 
 Action = NDArray[np.float32]

@@ -11,7 +11,7 @@ import numpy as np
 from agents.controllers.linear_loop import ERROR, RUDDER, YAW_RATE, sampled
 from shipgym import ShipModel
 from shipgym.arrays import Floats
-from shipgym.ships.linear import StraightRunning, linearise
+from shipgym.models.linear import StraightRunning, linearise
 from shipgym.trials.sensors import SEA_TRIAL
 
 

@@ -17,7 +17,7 @@ from agents.controllers.law import Gains
 from shipgym import ShipModel
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
-from shipgym.ships.linear import (
+from shipgym.models.linear import (
     Nomoto,
     StraightRunning,
     linearise,

@@ -22,7 +22,7 @@ from agents.controllers.law import Law, Nothing, Number, PathSignals
 from shipgym import ShipModel
 from shipgym.checks import check_number
 from shipgym.engine.records import Record
-from shipgym.ships.by_name import takes_name
+from shipgym.models.by_name import takes_name
 from shipgym.tasks.task import Task
 
 # integral time over lookahead time with which s^2 + s / T + 1 / (T Ti) has a double

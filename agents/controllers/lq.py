@@ -27,7 +27,7 @@ from shipgym import ShipModel
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.engine.compiling import tell_who_waits
-from shipgym.ships.by_name import takes_name
+from shipgym.models.by_name import takes_name
 from shipgym.tasks.scales import RUDDER_WEIGHT
 
 

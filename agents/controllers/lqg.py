@@ -23,7 +23,7 @@ from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.engine.records import Record
-from shipgym.ships.by_name import takes_name
+from shipgym.models.by_name import takes_name
 from shipgym.tasks.scales import RUDDER_WEIGHT
 
 # least jump of the heading error that is a new course, rad, and the same in standard

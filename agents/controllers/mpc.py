@@ -39,7 +39,7 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.engine.records import Record, table_of
 from shipgym.envs.engine import Engine
-from shipgym.ships.by_name import takes_name
+from shipgym.models.by_name import takes_name
 from shipgym.tasks.scales import STEPS_PER_LENGTH
 from shipgym.tasks.steering import HEADING_SCALE
 from shipgym.tasks.task import Task, course_keeping_task

@@ -15,8 +15,8 @@ from agents.controllers.controller import Controller
 from agents.controllers.linear_loop import checked_interval, rate_weight, sample_ship
 from shipgym import ShipModel
 from shipgym.checks import check_number
-from shipgym.ships.by_name import takes_name
-from shipgym.ships.linear import Nomoto, linearise, nomoto_of
+from shipgym.models.by_name import takes_name
+from shipgym.models.linear import Nomoto, linearise, nomoto_of
 from shipgym.tasks.scales import RUDDER_WEIGHT
 
 

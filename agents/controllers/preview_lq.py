@@ -36,7 +36,7 @@ from agents.controllers.wheel_over import own_lead
 from shipgym import InputError, ShipModel
 from shipgym.checks import check_number
 from shipgym.engine.records import Record
-from shipgym.ships.by_name import takes_name
+from shipgym.models.by_name import takes_name
 from shipgym.tasks.task import Task
 
 

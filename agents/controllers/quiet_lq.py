@@ -27,7 +27,7 @@ from agents.controllers.margins import Compensator
 from shipgym import ShipModel
 from shipgym.checks import check_number
 from shipgym.engine.records import Record
-from shipgym.ships.by_name import takes_name
+from shipgym.models.by_name import takes_name
 from shipgym.tasks.scales import RUDDER_WEIGHT
 
 

@@ -10,7 +10,7 @@ from agents.controllers.controller import UNKNOWN_MARGINS, Controller
 from agents.controllers.margins import Margins
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
-from shipgym.ships.by_name import ship_of
+from shipgym.models.by_name import ship_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,8 +23,8 @@ from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.engine.records import Record
-from shipgym.ships.by_name import takes_name
-from shipgym.ships.linear import Nomoto, linearise, nomoto_of, steady_turn_rudder
+from shipgym.models.by_name import takes_name
+from shipgym.models.linear import Nomoto, linearise, nomoto_of, steady_turn_rudder
 
 GRID = np.arange(0.02, 0.81, 0.02)  # rates of the feed-forward, times length over speed
 # share of the rudder limit beyond which no steady turn is tabulated

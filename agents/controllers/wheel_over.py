@@ -30,7 +30,7 @@ from agents.controllers.linear_loop import small_motions
 from agents.controllers.lq import LQ
 from shipgym import ShipModel
 from shipgym.checks import check_number
-from shipgym.ships.by_name import takes_name
+from shipgym.models.by_name import takes_name
 from shipgym.tasks.task import Task
 
 SHORTEST_LEAD, LONGEST_LEAD = 0.1, 10.0  # ship lengths

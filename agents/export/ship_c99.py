@@ -22,9 +22,9 @@ from shipgym.arrays import Floats
 from shipgym.engine.mathematics import sin_cos
 from shipgym.engine.motion import Motion, Push, Ship, lost, sail
 from shipgym.engine.records import flat, leaves
+from shipgym.models.simulate import LONGEST_STEP
 from shipgym.sea.open_sea import Sea, SeaParameters, push, sea_functions
 from shipgym.sea.weather_column import CALM, weather_column
-from shipgym.ships.simulate import LONGEST_STEP
 
 
 class ShipInput(NamedTuple):

@@ -14,7 +14,7 @@ from agents.export.nmea import Link, readings, sentences
 from shipgym import InputError, ShipModel, Weather
 from shipgym.checks import check_keys, check_number
 from shipgym.engine.trajectories import SEA_CHANNELS
-from shipgym.ships.simulate import Conditions, Passage
+from shipgym.models.simulate import Conditions, Passage
 
 STEP = 0.1  # s, between two sentences of a compass
 START = 54.0, 7.5  # degrees north and east, where the ship is at the beginning

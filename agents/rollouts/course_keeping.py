@@ -17,7 +17,7 @@ from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats, Integers
 from shipgym.checks import check_number, unexpected
 from shipgym.envs.engine import Engine
-from shipgym.ships.by_name import ship_of
+from shipgym.models.by_name import ship_of
 from shipgym.tasks.scales import observation_scales
 from shipgym.tasks.task import Task, course_keeping_task
 

@@ -34,8 +34,8 @@ from shipgym.errors import InputError, UnstableModelError
 from shipgym.extras import library
 from shipgym.files import write_json
 from shipgym.manoeuvres.verdicts import with_measured
+from shipgym.models import ShipModel
 from shipgym.plots import graph_objects
-from shipgym.ships import ShipModel
 from shipgym.tasks.task import course_keeping_task
 from shipgym.trials.ship_file import ShipFile
 

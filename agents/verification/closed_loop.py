@@ -17,7 +17,7 @@ from agents.verification.possible_draws import is_possible
 from agents.verification.tracks import Track, judged_task, keep_track, track_task
 from shipgym.arrays import Flags, Integers
 from shipgym.errors import InputError
-from shipgym.ships import ShipModel
+from shipgym.models import ShipModel
 from shipgym.trials.trial import Trial
 
 #: Share of the models drawn that an autopilot may lose control of.

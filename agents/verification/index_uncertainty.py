@@ -18,7 +18,7 @@ from shipgym.manoeuvres.intervals import (
     own_indices,
 )
 from shipgym.manoeuvres.turning import full_rudder_deg
-from shipgym.ships import ShipModel
+from shipgym.models import ShipModel
 from shipgym.trials.trial import Trial
 
 

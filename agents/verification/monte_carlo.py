@@ -26,8 +26,8 @@ from agents.verification.tracks import judged_task
 from shipgym.arrays import Flags
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
-from shipgym.ships import ShipModel
-from shipgym.ships.linear import is_course_stable
+from shipgym.models import ShipModel
+from shipgym.models.linear import is_course_stable
 
 DRAWS_A_JOB = 25
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from identification.samples.prediction import predict
 from shipgym.errors import InputError, UnstableModelError
-from shipgym.ships import ShipModel
-from shipgym.ships.simulate import orders, simulate
+from shipgym.models import ShipModel
+from shipgym.models.simulate import orders, simulate
 from shipgym.trials.trial import Trial
 
 

@@ -13,8 +13,8 @@ from identification.design.experiment import advise
 from identification.fit import Fit
 from shipgym.arrays import Flags, Floats
 from shipgym.errors import InputError
-from shipgym.ships import ShipModel
-from shipgym.ships.linear import steering_state_space
+from shipgym.models import ShipModel
+from shipgym.models.linear import steering_state_space
 from shipgym.trials.trial import Trial
 
 

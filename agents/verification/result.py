@@ -14,8 +14,8 @@ from agents.verification.tracks import Track
 from identification import IdentificationResult
 from shipgym.arrays import Flags, finite
 from shipgym.manoeuvres.quantiles import upper_95
-from shipgym.ships import ShipModel
-from shipgym.ships.linear import Nomoto
+from shipgym.models import ShipModel
+from shipgym.models.linear import Nomoto
 from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial
 

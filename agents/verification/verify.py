@@ -22,8 +22,8 @@ from agents.verification.tuned import tuned_design
 from identification.progress import Progress
 from shipgym.checks import quoted
 from shipgym.errors import InputError
-from shipgym.ships import ShipModel
-from shipgym.ships.linear import nomoto
+from shipgym.models import ShipModel
+from shipgym.models.linear import nomoto
 from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:

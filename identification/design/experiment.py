@@ -32,7 +32,7 @@ from shipgym import InputError, ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice
 from shipgym.manoeuvres import prbs_rudder, turning_circle, zigzag
-from shipgym.ships.by_name import takes_name
+from shipgym.models.by_name import takes_name
 
 #: Simulates a manoeuvre with a model.
 Candidate = Callable[[ShipModel], Trial]

@@ -11,8 +11,8 @@ from shipgym import InputError, ShipModel, Trial, UnstableModelError
 from shipgym.arrays import finite
 from shipgym.checks import check_number
 from shipgym.manoeuvres import zigzag
+from shipgym.models.by_name import takes_name
 from shipgym.ships import Structure
-from shipgym.ships.by_name import takes_name
 
 
 def table_of(model: ShipModel) -> Structure:

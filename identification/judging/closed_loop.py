@@ -15,9 +15,9 @@ from identification.samples.prediction import with_start
 from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.manoeuvres.execution import reversals, rudder
+from shipgym.models.simulate import Conditions, Passage
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.orders import checked_orders, two_commands
-from shipgym.ships.simulate import Conditions, Passage
 
 
 class ZigzagLeg(NamedTuple):

@@ -17,7 +17,7 @@ from identification.models.methods import Method, fit_held
 from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.manoeuvres import turning_circle
 from shipgym.manoeuvres.registry import FASTEST, QUICKEST_TURN
-from shipgym.ships.simulate import open_loop
+from shipgym.models.simulate import open_loop
 
 DURATION_LENGTHS = 50.0  # of a trial manoeuvre, at service speed
 STEP = 0.02  # of the time to sail one ship length

@@ -22,8 +22,8 @@ from identification.models.methods import fit_all, get_method
 from identification.samples.problem import Problem
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
+from shipgym.models.linear import straight_running
 from shipgym.ships import Structure, Term, get_structure, list_structures
-from shipgym.ships.linear import straight_running
 from shipgym.ships.structures import MMG
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.fit import Fit
 from shipgym import InputError, ShipModel, Trial
-from shipgym.ships.linear import is_course_stable, steering_state_space
+from shipgym.models.linear import is_course_stable, steering_state_space
 
 EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw", "p": "roll"}
 

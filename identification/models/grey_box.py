@@ -17,7 +17,8 @@ from identification.models.similarity import (
 from identification.samples.samples import Samples, build_samples
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.arrays import Floats
-from shipgym.ships import GreyBox, grey_box
+from shipgym.models import grey_box
+from shipgym.ships import GreyBox
 
 
 class _OwnAccelerations:

@@ -27,7 +27,7 @@ from identification.models.similarity import (
 from shipgym import InputError, Particulars, ShipModel, load_model
 from shipgym.arrays import Floats
 from shipgym.checks import quoted
-from shipgym.ships.catalogue import REFERENCE_SHIPS
+from shipgym.models.catalogue import REFERENCE_SHIPS
 from shipgym.ships.mmg import IDENTIFIED, dimensions, standard_form
 from shipgym.ships.particulars import ADDED_MASSES
 from shipgym.ships.structures import MMG

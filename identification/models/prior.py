@@ -19,7 +19,8 @@ from identification.samples.samples import Samples, build_samples
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Flags, Floats
 from shipgym.manoeuvres import turning_circle, zigzag
-from shipgym.ships import GreyBox, converted_model
+from shipgym.models import converted_model
+from shipgym.ships import GreyBox
 
 
 @dataclass(frozen=True, eq=False)

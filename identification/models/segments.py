@@ -11,8 +11,8 @@ from identification.samples.gaps import between_gaps
 from identification.samples.rudder import Rudder, rebuild, straight
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats, Integers
+from shipgym.models.simulate import LONGEST_STEP, wind_accelerations
 from shipgym.ships import Structure
-from shipgym.ships.simulate import LONGEST_STEP, wind_accelerations
 from shipgym.trials.resampling import usual_step
 
 BLOCK = 0.05  # time over which residuals are averaged, of that to sail one ship length

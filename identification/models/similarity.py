@@ -11,7 +11,7 @@ from identification.arrays import by_name
 from shipgym import InputError, Particulars, ShipModel, load_model
 from shipgym.arrays import Floats
 from shipgym.checks import quoted
-from shipgym.ships.catalogue import REFERENCE_SHIPS
+from shipgym.models.catalogue import REFERENCE_SHIPS
 
 AUTO = "auto"
 # correlation below which a reference ship is unlike a ship, and not taken unnamed

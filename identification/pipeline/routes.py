@@ -44,8 +44,8 @@ from identification.samples.problem import Problem, held_out
 from identification.samples.still_water import in_still_water
 from shipgym import InputError, ShipModel, Trial
 from shipgym.checks import quoted
+from shipgym.models.catalogue import fitted_box
 from shipgym.ships import GreyBox
-from shipgym.ships.catalogue import fitted_box
 from shipgym.ships.structures import GREY_BOX, MMG
 
 #: The structure beneath a kernel where none is named.

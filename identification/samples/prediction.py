@@ -9,7 +9,7 @@ import numpy as np
 
 from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
-from shipgym.ships.simulate import open_loop
+from shipgym.models.simulate import open_loop
 
 COMPARED = ("u", "v", "r", "psi")
 

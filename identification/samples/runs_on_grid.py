@@ -10,7 +10,7 @@ from identification.samples.surge_sway import SurgeSwayInputs
 from identification.samples.velocities import over_ground
 from shipgym import Trial
 from shipgym.arrays import Floats
-from shipgym.ships.simulate import wind_accelerations
+from shipgym.models.simulate import wind_accelerations
 from shipgym.trials.navigation import rotate_to_body
 
 STEP = 0.2  # of the grid, in the time to sail one ship length

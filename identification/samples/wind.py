@@ -9,10 +9,10 @@ from identification.samples.samples import Samples
 from identification.samples.velocities import CURRENT_COLUMNS
 from shipgym import InputError, Particulars, Trial
 from shipgym.arrays import Floats
+from shipgym.models.simulate import WIND
 from shipgym.sea.wind import AIR_DENSITY, WindCurves, wind_curves
 from shipgym.sea.wind_coefficients import WindTable
 from shipgym.ships.inertia import particulars_inertia
-from shipgym.ships.simulate import WIND
 from shipgym.ships.structures import MMG
 from shipgym.trials.navigation import rotate_to_body
 

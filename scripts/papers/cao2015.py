@@ -22,7 +22,7 @@ from identification.pipeline import identify
 from identification.samples.samples import build_samples
 from papers.row import Conclusion, Paper, Row
 from shipgym.manoeuvres import turning_circle, zigzag
-from shipgym.ships import ShipModel, load_model
+from shipgym.models import ShipModel, load_model
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]

@@ -28,7 +28,7 @@ from papers.zhu2018.container_ship import EQUATIONS, UNITS, best_errors
 from papers.zhu2018.fits import every, mean_square
 from papers.zhu2018.ships import zigzag_trial
 from shipgym.manoeuvres import turning_circle, turning_indices
-from shipgym.ships import load_model
+from shipgym.models import load_model
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]

@@ -29,7 +29,7 @@ from papers.zhu2018 import (
     steering_forms,
 )
 from papers.zhu2018.ships import zigzag_trial
-from shipgym.ships import load_model
+from shipgym.models import load_model
 
 WIDTH, DPI = 9.0, 100  # of a figure, inches; dots an inch
 TRUTH = {"color": "black", "lw": 1.6}

@@ -28,7 +28,7 @@ from papers.mei2019_targets import (
     virtual,
 )
 from papers.row import Conclusion, Paper, Row
-from shipgym.ships import ShipModel, load_model
+from shipgym.models import ShipModel, load_model
 
 Pair = tuple[float | None, float | None]  # their way, at best
 

@@ -21,7 +21,8 @@ from identification.samples.folds import LARGEST_RUDDER, TRIALS
 from identification.samples.samples import build_samples
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
-from shipgym.ships import GreyBox, ShipModel, converted_model, get_structure, load_model
+from shipgym.models import ShipModel, converted_model, load_model
+from shipgym.ships import GreyBox, get_structure
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]

@@ -23,7 +23,8 @@ from identification.result import IdentificationResult
 from identification.samples.samples import Samples, build_samples
 from papers.row import Paper, Requirement, Row
 from shipgym.manoeuvres import zigzag
-from shipgym.ships import get_structure, load_model, register_structure
+from shipgym.models import load_model
+from shipgym.ships import get_structure, register_structure
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]

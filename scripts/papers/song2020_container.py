@@ -20,8 +20,8 @@ from identification.estimators.tuned import TunedLSSVM
 from identification.pipeline import identify
 from papers.row import Row
 from shipgym.manoeuvres import zigzag, zigzag_indices
+from shipgym.models import load_model
 from shipgym.ships import container as own
-from shipgym.ships import load_model
 from shipgym.ships.inertia import inertia
 from shipgym.ships.terms import read_terms
 from shipgym.trials.trial import Trial

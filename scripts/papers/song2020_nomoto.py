@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.manoeuvres import zigzag
-from shipgym.ships import ShipModel
+from shipgym.models import ShipModel
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.trial import Trial

@@ -26,7 +26,8 @@ from shipgym.manoeuvres.towing_tank import (
     pure_yaw,
     yaw_with_drift,
 )
-from shipgym.ships import ShipModel, get_structure
+from shipgym.models import ShipModel
+from shipgym.ships import get_structure
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.trial import Trial

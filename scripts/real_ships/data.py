@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from shipgym.errors import InputError
-from shipgym.ships import ShipModel, converted_model
+from shipgym.models import ShipModel, converted_model
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.ship_file import ShipFile

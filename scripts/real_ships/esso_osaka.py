@@ -13,7 +13,7 @@ from identification.samples.prediction import predict
 from real_ships.data import Data, MeasuredShip
 from real_ships.measures import Floats
 from real_ships.section import Section, number, table
-from shipgym.ships import ShipModel
+from shipgym.models import ShipModel
 from shipgym.trials.trial import Trial
 
 SHIP, EVERY = "esso_osaka_3m", 2
@@ -95,7 +95,7 @@ def bare_study(ship: MeasuredShip) -> dict[str, Any]:
 
 def fastest(ship: MeasuredShip, shaft: float) -> ShipModel:
     """The reference ship at this scale and at the speed of the fastest approach."""
-    from shipgym.ships import converted_model
+    from shipgym.models import converted_model
     from shipgym.ships.steering import SteeringGear
 
     return converted_model(

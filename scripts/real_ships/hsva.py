@@ -31,7 +31,7 @@ from real_ships.recipe import (
 )
 from real_ships.section import Section, table
 from shipgym.manoeuvres import TurningIndices
-from shipgym.ships import ShipModel
+from shipgym.models import ShipModel
 
 SHIP, EVERY = "kvlcc2_hsva", 4
 #: Zigzags that switch at 5 or 10 degrees; those that switch at 1 degree are left aside.

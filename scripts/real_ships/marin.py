@@ -32,8 +32,8 @@ from real_ships.recipe import (
     refined,
 )
 from real_ships.section import Section, headings, number, table
-from shipgym.ships import ShipModel
-from shipgym.ships.scaling import scale_model
+from shipgym.models import ShipModel
+from shipgym.models.scaling import scale_model
 from shipgym.trials.trial import Trial
 
 SHIP, HSVA_EVERY = "kvlcc2_marin", 4

@@ -13,7 +13,7 @@ from identification.samples.prediction import predict
 from real_ships.section import number
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import TurningIndices, turning_circle, turning_indices
-from shipgym.ships import ShipModel
+from shipgym.models import ShipModel
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]

@@ -20,7 +20,7 @@ from real_ships.measures import (
     zigzag_errors,
 )
 from real_ships.section import Section, number, table
-from shipgym.ships import ShipModel
+from shipgym.models import ShipModel
 
 EVERY = 2  # about 1 Hz, as in the paper
 RUN = "zz_20_m"

@@ -31,7 +31,7 @@ from shipgym.manoeuvres import (
     turning_indices,
     zigzag_indices,
 )
-from shipgym.ships import ShipModel
+from shipgym.models import ShipModel
 from shipgym.trials.trial import Trial
 
 EVERY = 4

@@ -23,7 +23,8 @@ from identification.result import IdentificationResult
 from identification.samples.samples import build_samples
 from real_ships.data import MeasuredShip
 from real_ships.measures import zigzag_errors
-from shipgym.ships import ShipModel, get_structure, register_structure
+from shipgym.models import ShipModel
+from shipgym.ships import get_structure, register_structure
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.terms import short_terms
 

@@ -24,8 +24,8 @@ from shipgym.engine.specialise import (
     is_inlined,
     is_plain,
     named_globals,
-    nested_code,
 )
+from shipgym.python_files import nested_code
 
 
 def fingerprint(function: Any, hooks: Hooks) -> str:

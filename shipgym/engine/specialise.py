@@ -15,7 +15,7 @@ from types import CodeType, FunctionType
 from typing import Any, TypeVar
 
 from shipgym.errors import InputError
-from shipgym.python_files import place_of, refuse_closure
+from shipgym.python_files import nested_code, place_of, refuse_closure
 
 #: Functions that fill hooks, and values of constants, by name.
 Hooks = Mapping[str, Any]
@@ -79,14 +79,6 @@ def loaded_names(code: CodeType) -> tuple[str, ...]:
             if instruction.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
                 names.append(instruction.argval)
     return tuple(dict.fromkeys(names))
-
-
-def nested_code(code: CodeType) -> Iterator[CodeType]:
-    """The code of a function and of those within it, comprehensions among them."""
-    yield code
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from nested_code(constant)
 
 
 class Specialisation:

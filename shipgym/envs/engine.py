@@ -22,8 +22,8 @@ from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES
 from shipgym.envs.plain_python import plain_loop
 from shipgym.envs.randomisation import Pool, Randomisation
 from shipgym.errors import InputError
+from shipgym.models import ShipModel
 from shipgym.python_files import asked
-from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task, course_keeping_task
 
 Observation = NDArray[np.float32]

@@ -28,7 +28,7 @@ from shipgym.envs.randomisation import Randomisation
 from shipgym.envs.row_settings import parted, row_settings
 from shipgym.errors import InputError
 from shipgym.instruments.sensor_set import read_sensors
-from shipgym.ships import ShipModel, load_model
+from shipgym.models import ShipModel, load_model
 from shipgym.tasks.definition import read_definition
 from shipgym.tasks.task import Task
 

@@ -13,7 +13,7 @@ from shipgym.engine.compiling import compiled
 from shipgym.engine.goal_rewards import reward_goals
 from shipgym.engine.record_code import loader
 from shipgym.engine.records import LANES, Layout, flat
-from shipgym.ships import ShipModel
+from shipgym.models import ShipModel
 from shipgym.tasks.definition import TaskDefinition
 from shipgym.tasks.task import Observed, Task
 

@@ -17,9 +17,9 @@ from shipgym.engine.records import LANES, flat, leaves
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES, OutputPool, Outputs
 from shipgym.envs.randomisation import Pool
 from shipgym.errors import InputError
+from shipgym.models import ShipModel
 from shipgym.python_files import place_of
 from shipgym.sea.weather_column import weather_column
-from shipgym.ships import ShipModel
 from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.shapes import Shape, shapes_of
 from shipgym.tasks.task import Task

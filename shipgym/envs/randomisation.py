@@ -10,8 +10,8 @@ import numpy as np
 
 from shipgym.checks import check_choice, check_number, unexpected
 from shipgym.errors import InputError
+from shipgym.models import ShipModel, load_model
 from shipgym.sea.conditions import Weather
-from shipgym.ships import ShipModel, load_model
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.term_table import Structure
 

@@ -14,7 +14,7 @@ from shipgym.checks import check_text, unexpected
 from shipgym.envs.episode import Episode
 from shipgym.errors import InputError
 from shipgym.files import make_folder
-from shipgym.ships import ShipModel
+from shipgym.models import ShipModel
 
 Observation = TypeVar("Observation")
 Action = TypeVar("Action")

@@ -9,8 +9,8 @@ import numpy as np
 from shipgym.checks import placed, quoted
 from shipgym.engine.records import is_list, members
 from shipgym.errors import InputError
+from shipgym.models import ShipModel
 from shipgym.python_files import asked
-from shipgym.ships import ShipModel
 from shipgym.tasks.definition import TaskDefinition
 from shipgym.tasks.source import keywords
 from shipgym.tasks.task import Task

@@ -21,7 +21,7 @@ from shipgym.envs.environment import (
 )
 from shipgym.envs.outputs import ANSWER_OUTCOMES
 from shipgym.errors import InputError
-from shipgym.ships import ShipModel
+from shipgym.models import ShipModel
 from shipgym.tasks.task import ENV_OPTIONS
 
 Observation = NDArray[np.float32]

@@ -23,7 +23,7 @@ from shipgym.envs.environment import (
 from shipgym.envs.outputs import named_rows
 from shipgym.envs.rows import FIXED, Row
 from shipgym.errors import InputError
-from shipgym.ships import ShipModel
+from shipgym.models import ShipModel
 from shipgym.tasks.task import VECTOR_OPTIONS
 
 Observation = NDArray[np.float32]

@@ -16,9 +16,9 @@ from shipgym.envs.plain_python import plain_loop
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
 from shipgym.findings import Findings
+from shipgym.models import ShipModel
 from shipgym.python_files import asked, place_of
 from shipgym.sea.current_field import function_of_file
-from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
 
 STEPS = 400

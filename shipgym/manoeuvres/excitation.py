@@ -10,10 +10,10 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import number_of_steps
+from shipgym.models.by_name import takes_name
+from shipgym.models.ship_model import ShipModel
+from shipgym.models.simulate import Seed, orders, simulate
 from shipgym.sea.conditions import Weather
-from shipgym.ships.by_name import takes_name
-from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import Seed, orders, simulate
 from shipgym.trials.trial import Trial
 
 

@@ -18,8 +18,8 @@ from shipgym.manoeuvres.verdicts import (
     criterion_of,
     outside_envelope,
 )
-from shipgym.ships.by_name import takes_name
-from shipgym.ships.ship_model import ShipModel
+from shipgym.models.by_name import takes_name
+from shipgym.models.ship_model import ShipModel
 
 DRAWS = 100  # of an identified ship
 

@@ -8,7 +8,7 @@ from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.stopping import standard_stops
 from shipgym.manoeuvres.turning import full_rudder_deg, standard_circles
 from shipgym.manoeuvres.zigzags import standard_zigzags
-from shipgym.ships.ship_model import ShipModel
+from shipgym.models.ship_model import ShipModel
 
 
 @dataclass(frozen=True)

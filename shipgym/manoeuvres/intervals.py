@@ -12,8 +12,8 @@ from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 from shipgym.manoeuvres.quantiles import LEVELS_95, quantiles
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.standard import standard_manoeuvres
-from shipgym.ships.by_name import takes_name
-from shipgym.ships.ship_model import ShipModel
+from shipgym.models.by_name import takes_name
+from shipgym.models.ship_model import ShipModel
 
 #: From a ship to the indices of one of her manoeuvres, a dataclass such as
 #: `ZigzagIndices`.

@@ -21,7 +21,7 @@ from shipgym.manoeuvres.zigzags import (
     switch_heading_deg,
     zigzag_indices,
 )
-from shipgym.ships.ship_model import ShipModel
+from shipgym.models.ship_model import ShipModel
 from shipgym.trials.trial import Trial
 
 

@@ -13,10 +13,10 @@ from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import require, rudder, turning_rudder
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
+from shipgym.models.by_name import takes_name
+from shipgym.models.ship_model import ShipModel
+from shipgym.models.simulate import Conditions, Seed
 from shipgym.sea.conditions import Weather
-from shipgym.ships.by_name import takes_name
-from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.trial import Trial
 
 

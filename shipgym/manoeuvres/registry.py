@@ -10,8 +10,8 @@ import numpy as np
 
 from shipgym.checks import check_text
 from shipgym.errors import InputError, UnstableModelError
-from shipgym.ships.by_name import takes_name
-from shipgym.ships.ship_model import ShipModel
+from shipgym.models.by_name import takes_name
+from shipgym.models.ship_model import ShipModel
 from shipgym.trials.trial import KINDS, Trial
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import Conditions, Passage, as_trial
+from shipgym.models.ship_model import ShipModel
+from shipgym.models.simulate import Conditions, Passage, as_trial
 from shipgym.trials.trial import Trial
 
 #: Fills states of shape (n_steps + 1, n_columns), which begin with the start, and

@@ -19,11 +19,11 @@ from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import is_ordered, require, rudder
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
+from shipgym.models.by_name import takes_name
+from shipgym.models.linear import is_course_stable
+from shipgym.models.ship_model import ShipModel
+from shipgym.models.simulate import Conditions, Seed
 from shipgym.sea.conditions import Weather
-from shipgym.ships.by_name import takes_name
-from shipgym.ships.linear import is_course_stable
-from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.trial import Trial
 
 SpiralMethod = Literal["direct", "reverse"]

@@ -12,10 +12,11 @@ from shipgym.manoeuvres.excitation import shaft_of
 from shipgym.manoeuvres.execution import distance_sailed, reached, require, ship_length
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
+from shipgym.models import ShipModel
+from shipgym.models.by_name import takes_name
+from shipgym.models.simulate import Conditions, Seed
 from shipgym.sea.conditions import Weather
-from shipgym.ships import ShipEquations, ShipModel
-from shipgym.ships.by_name import takes_name
-from shipgym.ships.simulate import Conditions, Seed
+from shipgym.ships import ShipEquations
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
 

@@ -14,9 +14,9 @@ import numpy as np
 from shipgym.arrays import Floats, integral
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.ships.by_name import takes_name
+from shipgym.models.by_name import takes_name
+from shipgym.models.ship_model import ShipModel
 from shipgym.ships.inertia import inertia, rigid_inertia
-from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
 

@@ -16,10 +16,10 @@ from shipgym.manoeuvres.execution import (
     turning_rudder,
 )
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
+from shipgym.models.by_name import takes_name
+from shipgym.models.ship_model import ShipModel
+from shipgym.models.simulate import Seed, orders, simulate
 from shipgym.sea.conditions import Weather
-from shipgym.ships.by_name import takes_name
-from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import Seed, orders, simulate
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
 

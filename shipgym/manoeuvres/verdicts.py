@@ -14,8 +14,8 @@ from shipgym.manoeuvres.intervals import IndexInterval, worst
 from shipgym.manoeuvres.measured import MeasuredIndex, measured_indices
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.stopping import StoppingIndices
+from shipgym.models.ship_model import ShipModel
 from shipgym.ships.envelope import ENVELOPE_CHANNELS
-from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import Trial
 
 

@@ -20,10 +20,10 @@ from shipgym.manoeuvres.execution import (
     ship_length,
 )
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
+from shipgym.models.by_name import takes_name
+from shipgym.models.ship_model import ShipModel
+from shipgym.models.simulate import Conditions, Passage, Seed, as_trial, orders
 from shipgym.sea.conditions import Weather
-from shipgym.ships.by_name import takes_name
-from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import Conditions, Passage, Seed, as_trial, orders
 from shipgym.trials.trial import Trial
 
 STANDARD_DEG = (10.0, 20.0)

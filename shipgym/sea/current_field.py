@@ -11,7 +11,7 @@ import numpy as np
 from shipgym.checks import check_text
 from shipgym.errors import InputError
 from shipgym.python_files import check_function, load_file, place_of, refuse_closure
-from shipgym.tasks.refused_code import refuse_foreign_random
+from shipgym.refused_code import refuse_foreign_random
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Ship models, structures and reference ships, each imported on first use."""
+"""Structures and equations of ships, each imported on first use."""
 
 from lazy_loader import attach_stub
 

@@ -1,13 +1,6 @@
-from .catalogue import converted_model as converted_model
-from .catalogue import grey_box as grey_box
-from .catalogue import list_models as list_models
-from .catalogue import load_model as load_model
-from .catalogue import register_ship_equations as register_ship_equations
-from .catalogue import truth_of as truth_of
 from .envelope import Envelope as Envelope
 from .equations import ShipEquations as ShipEquations
 from .grey_boxes import GreyBox as GreyBox
-from .ship_model import ShipModel as ShipModel
 from .structures import get_structure as get_structure
 from .structures import list_structures as list_structures
 from .structures import register_structure as register_structure

@@ -280,7 +280,7 @@ class ManoeuvringModel:
     # ---- model file ------------------------------------------------------------------
 
     def to_dict(self) -> dict[str, Any]:
-        """Content of a model file, ready for JSON (see `shipgym.ships.model_file`)."""
+        """Content of a model file, ready for JSON (see `shipgym.models.model_file`)."""
         covariance = self.covariance
         envelope = self.envelope
         fields = {

@@ -13,7 +13,6 @@ from math import sqrt
 
 from shipgym.constants import SEA_WATER
 from shipgym.ships.particulars import Particulars
-from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
 
 LENGTH = 160.93  # m
@@ -67,17 +66,26 @@ N = {
 }
 
 
-def mariner(service_speed: float = 7.7175) -> ShipModel:
-    """The Mariner class reference ship, expanded about a service speed U0 in m/s."""
-    coefficients = {}
+STEERING = SteeringGear(rudder_limit_deg=40.0, rudder_rate_deg_s=5.0, time_constant=1.0)
+SOURCE = "Chislett & Strom-Tejsen 1965, in the form of the MSS toolbox (Fossen 1994)"
+
+
+def coefficients() -> dict[str, float]:
+    """Coefficients of structure `abkowitz`, rudder positive to starboard."""
+    found = {}
     for force, table in (("X", X), ("Y", Y), ("N", N)):
         for term, value in table.items():
             turned = (-1.0) ** term.count("d")
-            coefficients[f"{force}_{term}"] = value * 1e-5 * turned
+            found[f"{force}_{term}"] = value * 1e-5 * turned
+    return found
+
+
+def particulars(service_speed: float) -> Particulars:
+    """Particulars of the ship at a service speed, m/s."""
     # prime system, about midship
     mass = 798e-5
     inertia = 39.2e-5
-    particulars = Particulars(
+    return Particulars(
         name="Mariner class cargo ship",
         length=LENGTH,
         beam=23.17,
@@ -92,19 +100,4 @@ def mariner(service_speed: float = 7.7175) -> ShipModel:
         Y_rdot=-9.354e-5,
         N_vdot=4.646e-5,
         N_rdot=-43.8e-5,
-    )
-    return ShipModel(
-        name="mariner",
-        structure="abkowitz",
-        particulars=particulars,
-        steering=SteeringGear(
-            rudder_limit_deg=40.0, rudder_rate_deg_s=5.0, time_constant=1.0
-        ),
-        coefficients=coefficients,
-        provenance={
-            "source": (
-                "Chislett & Strom-Tejsen 1965, in the form of the MSS toolbox (Fossen"
-                " 1994)"
-            )
-        },
     )

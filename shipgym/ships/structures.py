@@ -24,7 +24,7 @@ NO_TABLES = {
     GREY_BOX: (
         "a table of terms, got 'grey-box', which is a reference ship and a table; give"
         " the reference ship: identify(..., structure='grey-box',"
-        " reference_model='tanker'), or shipgym.ships.grey_box"
+        " reference_model='tanker'), or shipgym.models.grey_box"
     ),
     MMG: (
         "a table of terms, got 'mmg', which is none; choose one, such as 'abkowitz' or"

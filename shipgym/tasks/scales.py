@@ -9,8 +9,8 @@ from math import radians
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.ships.by_name import takes_name
-from shipgym.ships.ship_model import ShipModel
+from shipgym.models.by_name import takes_name
+from shipgym.models.ship_model import ShipModel
 
 #: Control intervals in the time to travel one ship length, about.
 STEPS_PER_LENGTH = 20.0

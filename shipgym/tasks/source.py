@@ -23,8 +23,8 @@ from shipgym.engine.records import (
 )
 from shipgym.errors import InputError
 from shipgym.python_files import asked, check_function, load_file, refuse_closure
+from shipgym.refused_code import refuse_foreign_random, refuse_writes_to_plan
 from shipgym.tasks.contract import Setting
-from shipgym.tasks.refused_code import refuse_foreign_random, refuse_writes_to_plan
 
 UNBOUNDED = Setting("")
 

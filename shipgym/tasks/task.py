@@ -11,9 +11,9 @@ from shipgym.checks import check_choice, check_keys, check_number, check_whole
 from shipgym.engine.motion import Ship
 from shipgym.errors import InputError
 from shipgym.instruments.sensor_set import SensorSet, read_sensors, shipped_sensors
+from shipgym.models import ShipModel
 from shipgym.python_files import asked
 from shipgym.sea.conditions import Weather, as_weather
-from shipgym.ships import ShipModel
 from shipgym.ships.manoeuvring_model import ship_of
 from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.definition import TaskDefinition, read_definition

@@ -222,7 +222,7 @@ def vessel(source: Any, steps: int = 2) -> Callable[..., Motion]:
     InputError
         For a model whose forces are a sum over a table, which no task can name.
     """
-    from shipgym.ships import ShipModel, load_model
+    from shipgym.models import ShipModel, load_model
     from shipgym.ships.manoeuvring_model import ship_of
 
     model = source if isinstance(source, ShipModel) else load_model(source)

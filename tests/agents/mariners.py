@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from shipgym.ships import load_model
+from shipgym.models import load_model
 from shipgym.ships.steering import SteeringGear
 
 MARINER = load_model("mariner")

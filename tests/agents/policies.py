@@ -6,7 +6,7 @@ import numpy as np
 
 from agents import LearnedPolicy
 from agents.policies.network import Layer, Network
-from shipgym.ships import load_model
+from shipgym.models import load_model
 from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
 
 MARINER = load_model("mariner")

@@ -38,10 +38,10 @@ from agents.export.variables import AUTOPILOT_INPUTS
 from shipgym.engine.motion import Motion
 from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError
+from shipgym.models import load_model
 from shipgym.sea import Current, Weather, Wind
 from shipgym.sea.open_sea import sea_functions
 from shipgym.sea.weather_column import CALM
-from shipgym.ships import load_model
 from shipgym.ships.kernel_boxes import Kernel, kernel_box
 from shipgym.tasks.task import path_following_task
 from tests.agents.compiling import built

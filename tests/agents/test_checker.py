@@ -6,7 +6,7 @@ import pytest
 
 from agents import LQ, LQG, PID, check_controller
 from shipgym.errors import InputError
-from shipgym.ships import load_model
+from shipgym.models import load_model
 from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
 from shipgym.tasks.task import path_following_task
 

@@ -13,7 +13,7 @@ from agents.agent_file import PRETRAINED, find_agent, list_pretrained
 from agents.controllers.interface import check_scales, model_hash
 from agents.controllers.registry import BUILT_IN, controller_class
 from shipgym.errors import InputError
-from shipgym.ships.mariner import mariner
+from shipgym.models.catalogue import mariner
 from shipgym.ships.steering import SteeringGear
 from tests.agents.mariners import MARINER
 

@@ -7,8 +7,8 @@ import pytest
 
 from agents import LQ, PID, sail, step_response
 from shipgym.errors import InputError
-from shipgym.ships import load_model
-from shipgym.ships.mariner import mariner
+from shipgym.models import load_model
+from shipgym.models.catalogue import mariner
 from shipgym.tasks.task import course_keeping_task
 
 MARINER = load_model("mariner")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from shipgym import ShipFile, load_model
-from shipgym.ships.simulate import open_loop
+from shipgym.models.simulate import open_loop
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "make_demo_trials.py"
 

@@ -254,7 +254,7 @@ def test_warm_goes_on_after_a_refusal_only_if_all_was_asked_for(monkeypatch):
         return SimpleNamespace(close=lambda: None)
 
     monkeypatch.setattr("gymnasium.make", make)
-    monkeypatch.setattr("shipgym.ships.list_models", list)
+    monkeypatch.setattr("shipgym.models.list_models", list)
     answer = shipgym("warm", "--all", "--json")
     assert answer.exit_code == 0
     refused = [one["refused"] for one in json.loads(answer.stdout)["ready"]]

@@ -15,8 +15,8 @@ from agents import (
 )
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
+from shipgym.models import load_model
 from shipgym.sea import Current, Weather
-from shipgym.ships import load_model
 from shipgym.tasks.task import course_keeping_task, path_following_task
 
 MARINER = load_model("mariner")

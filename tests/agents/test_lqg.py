@@ -13,8 +13,8 @@ from agents.controllers.law import Signals
 from agents.controllers.linear_loop import sample_ship
 from agents.controllers.memory import from_columns
 from shipgym.errors import InputError
-from shipgym.ships.conversions import nomoto, nomoto2_ship
-from shipgym.ships.linear import straight_running
+from shipgym.models.conversions import nomoto, nomoto2_ship
+from shipgym.models.linear import straight_running
 from shipgym.ships.steering import SteeringGear
 from shipgym.tasks.scales import control_interval
 from shipgym.tasks.task import course_keeping_task

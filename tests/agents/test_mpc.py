@@ -11,8 +11,8 @@ from agents.controllers.path_ahead import FAR, PathAhead
 from agents.rollouts.rollout import episode_costs
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
+from shipgym.models import load_model
 from shipgym.sea import Current, Weather
-from shipgym.ships import load_model
 from shipgym.tasks.task import path_following_task
 from tests.agents.mariners import MARINER
 

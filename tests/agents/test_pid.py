@@ -9,7 +9,7 @@ from agents import PID, sail
 from agents.controllers.linear_loop import rate_weight
 from agents.controllers.pid import optimal_poles, place_poles
 from shipgym.errors import InputError
-from shipgym.ships.linear import Nomoto, nomoto
+from shipgym.models.linear import Nomoto, nomoto
 from shipgym.ships.steering import SteeringGear
 from shipgym.tasks.scales import observation_scales
 from tests.agents.mariners import LENGTH_TIME, MARINER, UNSTABLE, changed

@@ -10,8 +10,8 @@ from agents import LQ, LQG, check_controller, sail
 from agents.policies.network import Layer, Network
 from agents.policies.policy import ORDERS, order_numbers
 from shipgym.errors import InputError
-from shipgym.ships import load_model
-from shipgym.ships.mariner import mariner
+from shipgym.models import load_model
+from shipgym.models.catalogue import mariner
 from shipgym.tasks.task import course_keeping_task, path_following_task
 from tests.agents.policies import MARINER, random_network, random_policy
 

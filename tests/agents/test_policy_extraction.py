@@ -18,7 +18,7 @@ from agents.policies.policy_extraction import actor_network
 from agents.training.residual import ResidualVecEnv
 from shipgym import ShipVecEnv
 from shipgym.errors import InputError
-from shipgym.ships import load_model
+from shipgym.models import load_model
 
 COURSE = "shipgym/CourseKeeping-v0"
 MARINER = load_model("mariner")

@@ -12,8 +12,8 @@ from safetensors.numpy import load_file, save_file
 
 from agents import PID, check_controller, load_agent
 from shipgym.errors import InputError
+from shipgym.models.catalogue import mariner
 from shipgym.sea import Current, Weather
-from shipgym.ships.mariner import mariner
 from tests.agents.policies import MARINER, random_policy
 
 POLICIES = {

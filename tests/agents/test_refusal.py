@@ -28,7 +28,7 @@ from agents.verification.result import verification_metrics
 from agents.verification.view import verification_view
 from identification.design.experiment import advise
 from shipgym import InputError, ShipFile, Trial, load_model
-from shipgym.ships.conversions import nomoto1_ship
+from shipgym.models.conversions import nomoto1_ship
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from agents import LQ, LQG, IntegralLineOfSight, LearnedPolicy, load_agent
 from agents.training.residual import ResidualVecEnv
 from shipgym import ShipVecEnv
 from shipgym.errors import InputError
-from shipgym.ships import load_model
+from shipgym.models import load_model
 
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
 DISCRETE = "shipgym/CourseKeepingDiscrete-v0"

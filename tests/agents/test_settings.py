@@ -27,8 +27,8 @@ from agents.training.settings import (
 )
 from shipgym import InputError
 from shipgym.files import named_values
+from shipgym.models.conversions import nomoto1_ship
 from shipgym.sea import Current, Weather
-from shipgym.ships.conversions import nomoto1_ship
 
 FREE = {"base": "none", "authority": 1.0}
 #: The least and the largest value that is allowed, and the nearest that is not.

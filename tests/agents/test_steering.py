@@ -22,7 +22,7 @@ from agents.export.simulated import SimulatedShip, simulate_ship
 from agents.export.steering import steer
 from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.errors import InputError
-from shipgym.ships import load_model
+from shipgym.models import load_model
 from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER
 from tests.agents.steering import free_port, no_waiting

@@ -8,7 +8,7 @@ import pytest
 from agents import LQ, PID, sail
 from agents.rollouts.rollout import episode_costs
 from shipgym.envs.engine import Engine
-from shipgym.ships import load_model
+from shipgym.models import load_model
 from shipgym.tasks.task import course_keeping_task
 
 SEEDS = np.arange(64)

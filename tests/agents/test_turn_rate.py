@@ -15,8 +15,8 @@ from agents.controllers.turn_rate import (
 )
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle
-from shipgym.ships import load_model
-from shipgym.ships.linear import straight_running
+from shipgym.models import load_model
+from shipgym.models.linear import straight_running
 
 MARINER, TANKER = load_model("mariner"), load_model("tanker")
 STILL = Signals(*np.zeros(len(Signals._fields)))

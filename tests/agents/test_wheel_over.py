@@ -10,8 +10,8 @@ from agents.controllers.wheel_over import own_lead
 from agents.rollouts.rollout import episode_costs
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
+from shipgym.models.linear import straight_running
 from shipgym.sea import Current, Weather
-from shipgym.ships.linear import straight_running
 from shipgym.tasks.task import path_following_task
 from tests.agents.mariners import MARINER
 

@@ -34,7 +34,8 @@ from shipgym import (
     UnstableModelError,
 )
 from shipgym.manoeuvres import turning_circle, zigzag
-from shipgym.ships import converted_model, get_structure
+from shipgym.models import converted_model
+from shipgym.ships import get_structure
 
 PARTICULARS = Particulars(length=160.93, speed=7.7175)
 COEFFICIENTS = {"c_r": -1 / 30.0, "c_r3": -4000.0 / 30.0, "c_d": 0.05 / 30.0}

@@ -8,7 +8,7 @@ import pytest
 from shipgym import ShipModel, check_ship_model
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
 from shipgym.manoeuvres.registry import standard_time
-from shipgym.ships.linear import straight_line_stability
+from shipgym.models.linear import straight_line_stability
 from tests.ships.foreign import FOREIGN, SECOND_FIVE
 
 

@@ -29,17 +29,17 @@ from identification.report.page import report_page
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag
-from shipgym.ships.catalogue import fitted_box
-from shipgym.ships.checker import check_ship_model
+from shipgym.models.catalogue import fitted_box
+from shipgym.models.checker import check_ship_model
+from shipgym.models.linear import nomoto
+from shipgym.models.scaling import scale_model
 from shipgym.ships.kernel_boxes import (
     Kernel,
     KernelBox,
     gaussians,
     kernel_box,
 )
-from shipgym.ships.linear import nomoto
 from shipgym.ships.particulars import Particulars
-from shipgym.ships.scaling import scale_model
 from shipgym.ships.steering import SteeringGear
 
 SHIP = Particulars(name="made up", length=7.0, speed=1.2)

@@ -178,7 +178,7 @@ def kvlcc2_overshoots(model):
 def test_kvlcc2_rm_svm_turns_like_the_ship_behind_its_zigzags():
     """Within 1 per cent at 35 deg, from 20 deg at most; the reference is 3 wide."""
     ship, model = (shipgym.load_model(name) for name in ("kvlcc2", "kvlcc2-rm-svm"))
-    bare = shipgym.ships.converted_model(
+    bare = shipgym.models.converted_model(
         "kvlcc2-l7", ship.particulars, ship.steering, ship.service_shaft_speed
     )
     truth = kvlcc2_turns(ship)

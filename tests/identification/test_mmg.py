@@ -40,9 +40,10 @@ from identification.options import Options
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.engine.motion import Motion, Ship
 from shipgym.manoeuvres import turning_circle, turning_indices
-from shipgym.ships import container, kvlcc2, load_model, mmg
+from shipgym.models import load_model
+from shipgym.models.scaling import scale_model
+from shipgym.ships import container, kvlcc2, mmg
 from shipgym.ships.particulars import ADDED_MASSES
-from shipgym.ships.scaling import scale_model
 from tests.ships.mmg import MMG_SHIPS, mmg_ship
 
 L7 = mmg.SHIP.particulars

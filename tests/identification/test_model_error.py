@@ -27,7 +27,7 @@ from identification.models.methods import fit_all, get_method
 from identification.samples.prediction import predict
 from shipgym import InputError, ShipModel, Trial, load_model
 from shipgym.manoeuvres import zigzag, zigzag_indices
-from shipgym.ships.simulate import simulate
+from shipgym.models.simulate import simulate
 from tests.ships.mmg import mmg_ship
 
 

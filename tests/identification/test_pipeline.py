@@ -24,7 +24,7 @@ from identification.options import changed_settings, name_of, plain
 from identification.pipeline.pose import pose
 from shipgym import InputError, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
-from shipgym.ships.simulate import open_loop
+from shipgym.models.simulate import open_loop
 
 
 def errors_percent(result: IdentificationResult, truth: ShipModel) -> dict[str, float]:

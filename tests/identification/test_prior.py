@@ -33,7 +33,7 @@ from identification.samples.samples import build_samples
 from shipgym import Particulars, ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
-from shipgym.ships.linear import steering_state_space
+from shipgym.models.linear import steering_state_space
 from shipgym.ships.structures import get_structure
 
 Floats = np.ndarray[Any, np.dtype[Any]]

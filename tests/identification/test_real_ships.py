@@ -18,7 +18,7 @@ from real_ships.section import Section, marks, number, put, table
 from identification import PriorKnowledge
 from shipgym import InputError, ShipModel
 from shipgym.manoeuvres import zigzag
-from shipgym.ships import load_model
+from shipgym.models import load_model
 
 SHIPS = Path(__file__).parents[1] / "ships"
 MEASURED_RUNS = Path(__file__).parents[2].parent / "shared" / "data"

@@ -21,7 +21,7 @@ from identification import (
 from identification.estimators import recursive_kernels as kernels
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
-from shipgym.ships import converted_model, load_model
+from shipgym.models import converted_model, load_model
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 TRUTH = np.array([3.0, -0.02, 500.0, 1.0])

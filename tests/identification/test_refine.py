@@ -29,7 +29,7 @@ from identification.models.shooting import (
 )
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
-from shipgym.ships.simulate import LONGEST_STEP
+from shipgym.models.simulate import LONGEST_STEP
 
 
 def parameters(model: ShipModel) -> np.ndarray:

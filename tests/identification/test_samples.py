@@ -17,7 +17,7 @@ from identification.samples.rudder import straight
 from identification.samples.samples import default_window, without_memory
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
-from shipgym.ships.simulate import open_loop
+from shipgym.models.simulate import open_loop
 
 
 def mismatch(model: ShipModel, samples: Samples) -> float:

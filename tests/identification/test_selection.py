@@ -16,7 +16,7 @@ from identification.judging.ranking import RankedFit
 from identification.judging.selection import select, simplest
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
-from shipgym.ships.linear import straight_running
+from shipgym.models.linear import straight_running
 from shipgym.trials.derivatives import time_derivative
 
 Auto = Callable[..., IdentificationResult]

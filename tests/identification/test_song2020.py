@@ -9,8 +9,8 @@ from papers.song2020_container import (
     regressors,
 )
 
+from shipgym.models import load_model
 from shipgym.ships import container as own
-from shipgym.ships import load_model
 from shipgym.ships.structures import get_structure
 
 

@@ -25,10 +25,10 @@ from identification.samples.wind import measured_wind
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, zigzag
+from shipgym.models.simulate import open_loop
 from shipgym.sea import Current, Weather, Wind
 from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.wind import AIR_DENSITY, wind_curves
-from shipgym.ships.simulate import open_loop
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.midship import to_project_conventions
 from shipgym.trials.resampling import Log

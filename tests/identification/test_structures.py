@@ -12,8 +12,8 @@ import shipgym
 from identification import identify
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import turning_circle, zigzag
+from shipgym.models.linear import nomoto
 from shipgym.ships import structures
-from shipgym.ships.linear import nomoto
 from shipgym.ships.structures import get_structure, list_structures
 
 L, U0, N0 = 160.93, 7.7175, 1.2

@@ -29,8 +29,8 @@ from shipgym.engine.records import Layout, row_of, table_of
 from shipgym.engine.specialise import Specialisation, called, named_globals
 from shipgym.errors import InputError
 from shipgym.instruments.sensor_set import shipped_sensors
+from shipgym.models.catalogue import kvlcc2, kvlcc2_l7
 from shipgym.sea.open_sea import sea_hooks
-from shipgym.ships.catalogue import kvlcc2, kvlcc2_l7
 from shipgym.ships.term_functions import accelerations_source
 from shipgym.ships.terms import Term
 from shipgym.tasks.definition import read_definition

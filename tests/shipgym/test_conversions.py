@@ -18,7 +18,7 @@ from shipgym import (
     Trial,
     straight_line_stability,
 )
-from shipgym.ships.conversions import (
+from shipgym.models.conversions import (
     Nomoto,
     linear_steering_ship,
     nomoto,
@@ -31,8 +31,8 @@ from shipgym.ships.conversions import (
     steering_state_space,
     transfer_function,
 )
-from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import open_loop
+from shipgym.models.ship_model import ShipModel
+from shipgym.models.simulate import open_loop
 
 pytestmark = pytest.mark.interpreted
 

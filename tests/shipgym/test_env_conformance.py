@@ -16,8 +16,8 @@ from stable_baselines3.common.vec_env import SubprocVecEnv
 import shipgym
 from shipgym import InputError
 from shipgym.envs.registration import ENVIRONMENTS
+from shipgym.models import ShipModel
 from shipgym.sea import Current, Weather, Wind
-from shipgym.ships import ShipModel
 
 pytestmark = pytest.mark.interpreted
 

@@ -8,7 +8,7 @@ import pytest
 
 import shipgym
 from shipgym import InputError, ShipModel, manoeuvres
-from shipgym.ships.catalogue import container, kvlcc2, kvlcc2_l7, tanker
+from shipgym.models.catalogue import container, kvlcc2, kvlcc2_l7, tanker
 from tests.shipgym.reference import table
 
 

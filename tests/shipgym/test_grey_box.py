@@ -14,11 +14,11 @@ import shipgym
 from shipgym import ShipModel
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
-from shipgym.ships import converted_model, grey_box
-from shipgym.ships.checker import check_ship_model
-from shipgym.ships.conversions import nomoto2_ship
-from shipgym.ships.linear import nomoto
-from shipgym.ships.scaling import scale_model
+from shipgym.models import converted_model, grey_box
+from shipgym.models.checker import check_ship_model
+from shipgym.models.conversions import nomoto2_ship
+from shipgym.models.linear import nomoto
+from shipgym.models.scaling import scale_model
 from shipgym.ships.structures import get_structure, register_structure
 
 pytestmark = pytest.mark.interpreted

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.signal import lsim
 
 from shipgym.errors import InputError
-from shipgym.ships import ShipModel, get_structure, load_model
-from shipgym.ships.linear import (
+from shipgym.models import ShipModel, load_model
+from shipgym.models.linear import (
     StraightRunning,
     is_course_stable,
     linearise,
@@ -22,7 +22,8 @@ from shipgym.ships.linear import (
     steering_state_space,
     straight_running,
 )
-from shipgym.ships.scaling import scale_model
+from shipgym.models.scaling import scale_model
+from shipgym.ships import get_structure
 
 MARINER = load_model("mariner")
 LENGTH, SPEED = MARINER.particulars["length"], MARINER.particulars["speed"]

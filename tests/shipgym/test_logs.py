@@ -8,7 +8,7 @@ import pytest
 
 from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag
-from shipgym.ships import load_model
+from shipgym.models import load_model
 from shipgym.trials.instrument_offsets import rudder_offset, straight_parts
 from shipgym.trials.navigation import local_metres
 from shipgym.trials.ship_file import ShipFile

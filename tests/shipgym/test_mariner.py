@@ -7,7 +7,7 @@ import pytest
 
 import shipgym
 from shipgym import manoeuvres
-from shipgym.ships.mariner import mariner
+from shipgym.models.catalogue import mariner
 from tests.shipgym.reference import table
 
 STATE = ("x_m", "y_m", "psi_rad", "u_m_s", "v_m_s", "r_rad_s", "delta_rad")

@@ -13,7 +13,7 @@ from shipgym import InputError, UnstableModelError, load_model, manoeuvres
 from shipgym.engine import steered, trajectories
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.specialise import Specialisation
-from shipgym.ships.simulate import open_loop
+from shipgym.models.simulate import open_loop
 
 pytestmark = pytest.mark.interpreted
 

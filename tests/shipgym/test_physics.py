@@ -11,7 +11,7 @@ import shipgym
 from shipgym import manoeuvres, scale_model
 from shipgym.engine import motion
 from shipgym.engine.motion import Ship
-from shipgym.ships.catalogue import REFERENCE_SHIPS
+from shipgym.models.catalogue import REFERENCE_SHIPS
 from shipgym.ships.inertia import inertia, rigid_inertia
 from shipgym.ships.term_table import Structure
 

@@ -11,8 +11,8 @@ from shipgym import InputError
 from shipgym.envs.artist import scene
 from shipgym.envs.engine import Engine
 from shipgym.envs.rendering import COLOURS, SIZE, Renderer, Scene
+from shipgym.models import load_model
 from shipgym.sea import Current, Weather, Wind
-from shipgym.ships import load_model
 from shipgym.tasks.guidance import track
 
 LENGTH, BEAM = 160.0, 40.0

@@ -13,11 +13,11 @@ from shipgym import InputError, ShipModel, UnstableModelError
 from shipgym.engine.envelope import Envelope as EngineEnvelope
 from shipgym.engine.envelope import Four, Triangle, envelope_distance, outside_range
 from shipgym.engine.motion import Motion
+from shipgym.models.conversions import nomoto1_ship
+from shipgym.models.simulate import open_loop
 from shipgym.ships import Envelope, get_structure
-from shipgym.ships.conversions import nomoto1_ship
 from shipgym.ships.envelope import smallest_ellipsoid
 from shipgym.ships.shared_structure import SharedStructure
-from shipgym.ships.simulate import open_loop
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,7 @@ from shipgym import (
 )
 from shipgym.engine.motion import Motion, Ship
 from shipgym.errors import UnstableModelError
-from shipgym.ships.linear import nomoto
+from shipgym.models.linear import nomoto
 from shipgym.ships.structures import REGISTERED_EQUATIONS
 
 pytestmark = pytest.mark.interpreted

@@ -6,7 +6,7 @@ import pytest
 from shipgym import InputError, Trial, load_model, manoeuvres
 from shipgym.manoeuvres import Spiral
 from shipgym.manoeuvres.settling import Voyage
-from shipgym.ships.simulate import Conditions
+from shipgym.models.simulate import Conditions
 
 
 @pytest.mark.parametrize(

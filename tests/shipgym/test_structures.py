@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 import shipgym
 from shipgym import InputError, Particulars, ShipModel, SteeringGear
 from shipgym.engine.motion import Motion, Ship
+from shipgym.models.linear import nomoto
 from shipgym.ships import structures
-from shipgym.ships.linear import nomoto
 from shipgym.ships.structures import get_structure, list_structures
 from shipgym.ships.term_table import Structure
 from shipgym.ships.terms import Term, read_terms

@@ -20,6 +20,7 @@ from shipgym.engine.motion import Motion
 from shipgym.engine.records import Layout
 from shipgym.envs.engine import Engine
 from shipgym.instruments import bridge
+from shipgym.models.simulate import Conditions, Passage, open_loop, simulate
 from shipgym.sea import (
     AIR_DENSITY,
     Current,
@@ -36,7 +37,6 @@ from shipgym.sea import (
 from shipgym.sea.drift import wave_drift
 from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.open_sea import Sea, SeaParameters
-from shipgym.ships.simulate import Conditions, Passage, open_loop, simulate
 from shipgym.tasks.task import course_keeping_task
 from shipgym.trials.sensors import Sensors
 from tests.shipgym.outer import outer

@@ -25,7 +25,7 @@ from identification.models.formulas import clarke_derivatives
 from shipgym import ShipModel
 from shipgym.engine.mathematics import arctan2, sin_cos
 from shipgym.engine.motion import Motion, Ship
-from shipgym.ships.catalogue import model_of
+from shipgym.models.catalogue import model_of
 from shipgym.ships.equations import ShipEquations, record_of
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import partial
 
 from shipgym import ShipModel
-from shipgym.ships.catalogue import model_of
+from shipgym.models.catalogue import model_of
 from tests.ships import (
     car_carrier,
     harbour_tug,

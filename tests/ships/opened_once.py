@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from shipgym import ShipModel
-from shipgym.ships.catalogue import model_of
+from shipgym.models.catalogue import model_of
 from tests.ships import cross_flow, naval_vessel
 
 OPENED_ONCE: dict[str, Callable[[], ShipModel]] = {

@@ -19,7 +19,7 @@ from typing import Any
 
 from shipgym import ShipModel
 from shipgym.engine.motion import Motion, Ship
-from shipgym.ships.catalogue import model_of
+from shipgym.models.catalogue import model_of
 from shipgym.ships.equations import ShipEquations, record_of
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear

@@ -37,7 +37,7 @@ from papers.zhu2018.ships import (
     straight_line,
     zigzag_trial,
 )
-from shipgym.ships import ShipModel
+from shipgym.models import ShipModel
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]

@@ -18,7 +18,8 @@ from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.tuned import TunedLSSVM
 from identification.samples.samples import Samples, build_samples
-from shipgym.ships import ShipModel, get_structure
+from shipgym.models import ShipModel
+from shipgym.ships import get_structure
 from shipgym.ships.structures import own_structure
 from shipgym.trials.trial import Trial
 

@@ -26,7 +26,8 @@ from identification.samples.samples import build_samples
 from papers.row import ELSEWHERE, Row
 from papers.zhu2018.fits import every
 from shipgym.manoeuvres import zigzag
-from shipgym.ships import ShipModel, get_structure
+from shipgym.models import ShipModel
+from shipgym.ships import get_structure
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.trial import Trial

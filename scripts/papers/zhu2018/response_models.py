@@ -21,8 +21,8 @@ from identification.estimators.tuned import TunedLSSVM
 from identification.pipeline import identify
 from papers.row import Row
 from shipgym.manoeuvres import zigzag
-from shipgym.ships import ShipModel
-from shipgym.ships.conversions import nomoto1_ship
+from shipgym.models import ShipModel
+from shipgym.models.conversions import nomoto1_ship
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.sensors import Sensor, Sensors

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from papers.zhu2018.fits import every
 from shipgym.manoeuvres import zigzag
-from shipgym.ships import ShipModel
-from shipgym.ships.catalogue import container
+from shipgym.models import ShipModel
+from shipgym.models.catalogue import container
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]

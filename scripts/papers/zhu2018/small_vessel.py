@@ -29,7 +29,7 @@ from papers.zhu2018.fits import (
 )
 from papers.zhu2018.steering_forms import MOST_C
 from shipgym.manoeuvres import zigzag
-from shipgym.ships import ShipModel
+from shipgym.models import ShipModel
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.sensors import Sensor, Sensors

@@ -34,7 +34,7 @@ from papers.zhu2018.fits import (
     term_columns,
 )
 from papers.zhu2018.ships import INTERVAL, ship, zigzag_trial
-from shipgym.ships import ShipModel
+from shipgym.models import ShipModel
 from shipgym.trials.trial import Trial
 
 AIM = {"v": 0.02, "r": 0.005}  # of the chosen pair

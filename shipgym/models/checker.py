@@ -9,11 +9,11 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.findings import Findings
-from shipgym.ships.catalogue import load_model
+from shipgym.models.catalogue import load_model
+from shipgym.models.ship_model import ShipModel
+from shipgym.models.simulate import orders
 from shipgym.ships.equations import ShipEquations
 from shipgym.ships.manoeuvring_model import ship_of
-from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import orders
 from shipgym.ships.term_checks import EQUATION_NAMES
 from shipgym.ships.term_table import ANGULAR, Structure
 from shipgym.trials.trial import Trial

@@ -7,11 +7,11 @@ import numpy as np
 
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.ships.by_name import takes_name
+from shipgym.models.by_name import takes_name
+from shipgym.models.ship_model import ShipModel
 from shipgym.ships.envelope import Envelope
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.particulars_limits import LIMITS
-from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.term_table import Structure
 
 

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, unexpected
 from shipgym.errors import InputError
-from shipgym.ships.linear import (
+from shipgym.models.linear import (
     Nomoto,
     StraightRunning,
     linearise,
@@ -29,8 +29,8 @@ from shipgym.ships.linear import (
     steering_state_space,
     straight_running,
 )
+from shipgym.models.ship_model import ShipModel
 from shipgym.ships.particulars import Particulars
-from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import get_structure
 

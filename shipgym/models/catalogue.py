@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 from shipgym.checks import check_choice
 from shipgym.errors import InputError
-from shipgym.ships.ship_model import ShipModel
+from shipgym.models.ship_model import ShipModel
 from shipgym.ships.structures import (
     REGISTERED_EQUATIONS,
     get_equations,
@@ -49,11 +49,18 @@ def model_of(
 # ---- reference ships -----------------------------------------------------------------
 
 
-def mariner() -> ShipModel:
-    """Mariner class cargo ship, 3 degrees of freedom, service speed 15 knots."""
+def mariner(service_speed: float = 7.7175) -> ShipModel:
+    """Mariner class cargo ship, 3 degrees of freedom; service speed U0 in m/s."""
     from shipgym.ships import mariner as file
 
-    return file.mariner()
+    return ShipModel(
+        name="mariner",
+        structure="abkowitz",
+        particulars=file.particulars(service_speed),
+        steering=file.STEERING,
+        coefficients=file.coefficients(),
+        provenance={"source": file.SOURCE},
+    )
 
 
 def container(rudder_limit_deg: float = 35.0) -> ShipModel:

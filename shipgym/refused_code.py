@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from shipgym.engine.specialise import nested_code
 from shipgym.errors import InputError
-from shipgym.python_files import LIBRARIES
+from shipgym.python_files import LIBRARIES, nested_code
 
 #: Modules of random numbers that depend on more than key and number of an episode.
 _MODULES = {"numpy.random": np.random, "random": random}

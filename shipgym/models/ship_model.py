@@ -14,13 +14,13 @@ from shipgym.arrays import Floats
 from shipgym.checks import placed
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
+from shipgym.models.model_file import numbers_hash, read_model
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
-from shipgym.ships.model_file import numbers_hash, read_model
 
 if TYPE_CHECKING:  # for annotations, and where a ship is simulated
+    from shipgym.models.simulate import Seed
     from shipgym.sea.conditions import Weather
     from shipgym.ships.equations import ShipEquations
-    from shipgym.ships.simulate import Seed
     from shipgym.ships.term_table import Structure
     from shipgym.trials.trial import Trial
 
@@ -97,7 +97,7 @@ class ShipModel(ManoeuvringModel):
             `wind_speed` and `wind_from` tell the weather. What instruments show of it
             all: `shipgym.trials.sensors.Sensors`.
         """
-        from shipgym.ships.simulate import simulate  # an environment does without
+        from shipgym.models.simulate import simulate  # an environment does without
 
         return simulate(
             self, commands, dt, state, water_depth, weather=weather, seed=seed
@@ -157,7 +157,7 @@ class ShipModel(ManoeuvringModel):
         return [replace(box, reference=drawn) for drawn in references]
 
     def save(self, path: str | Path) -> None:
-        """Write the model as a JSON file (format in `shipgym.ships.model_file`)."""
+        """Write the model as a JSON file (format in `shipgym.models.model_file`)."""
         write_json({**self.to_dict(), "sha256": numbers_hash(self)}, Path(path))
 
     @classmethod

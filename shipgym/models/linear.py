@@ -14,9 +14,9 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
-from shipgym.ships.by_name import takes_name
+from shipgym.models.by_name import takes_name
+from shipgym.models.ship_model import ShipModel
 from shipgym.ships.inertia import inertia
-from shipgym.ships.ship_model import ShipModel
 
 #: Largest neutral rudder, rad: beyond, a model is not that of a ship.
 LARGEST_RUDDER = np.radians(20.0)

@@ -34,11 +34,11 @@ def takes_name(function: Function) -> Function:
 
 def ship_of(model: Any) -> Any:
     """The model itself, or that of a name or a file."""
-    ships = import_module("shipgym.ships")
-    if isinstance(model, ships.ShipModel):
+    models = import_module("shipgym.models")
+    if isinstance(model, models.ShipModel):
         return model
     if isinstance(model, str | Path):
-        return ships.load_model(model)
+        return models.load_model(model)
     raise InputError(
         f"model: expected a ship model, its name or its file, got {shown(model)}"
     )

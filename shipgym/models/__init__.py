@@ -1,0 +1,5 @@
+"""Ship models: by name or from files, simulated, checked, scaled; each on first use."""
+
+from lazy_loader import attach_stub
+
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
