@@ -11,7 +11,6 @@ from .errors import InputError as InputError
 from .errors import ManoeuvreError as ManoeuvreError
 from .errors import UnstableModelError as UnstableModelError
 from .examples import example_ship as example_ship
-from .manoeuvres import towing_tank as towing_tank
 from .models import ShipModel as ShipModel
 from .models import list_models as list_models
 from .models import load_model as load_model

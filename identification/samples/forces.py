@@ -19,7 +19,6 @@ from identification.estimators.threads import single_threaded
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.arrays import Floats, Integers
 from shipgym.checks import check_choice
-from shipgym.manoeuvres.towing_tank import rigid_body_forces
 from shipgym.ships import Term, get_structure
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
 
@@ -91,16 +90,15 @@ def force_regression(
     Parameters
     ----------
     trials : sequence of Trial
-        With the channels u, v, r, X, Y, N, from `shipgym.manoeuvres.towing_tank` or a
-        real one. Accelerations are those of splines through the velocities, which a
-        carriage prescribes, between jumps of a static test.
+        With the channels u, v, r, X, Y, N. Accelerations are those of splines through
+        the velocities, which a carriage prescribes, between jumps of a static test.
     structure : SharedStructure
         Such as `pmm38`.
     particulars : Particulars
         Length, water density; mass, centre of gravity and yaw gyradius where
         `model_inertia`.
     model_inertia : bool
-        Whether the inertia of the ship herself is in the forces (`Tank.model_inertia`);
+        Whether the inertia of the ship herself is in the forces of a captive test;
         it is taken out.
     """
     if not trials:
@@ -228,6 +226,31 @@ def _prime_forces(
     accelerations = [motion[name] for name in ACCELERATIONS]
     rigid = (mass, mass * ship.xg_prime, ship.inertia_prime)
     return forces + rigid_body_forces(rigid, velocities, accelerations)
+
+
+def rigid_body_forces(
+    rigid: Sequence[float],
+    velocity: Sequence[Floats] | Floats,
+    acceleration: Sequence[Floats] | Floats,
+) -> Floats:
+    """Forces X, Y and moment N that accelerate a ship without water, about midship.
+
+    Fossen 2011, 3.3. All in SI units or all in the prime system: `rigid` is mass, its
+    static moment and the yaw inertia; forces, and velocity and acceleration in surge,
+    sway and yaw, have the shape (3, n_samples).
+    """
+    m, static, yaw = rigid
+    u, v, r = velocity
+    udot, vdot, rdot = acceleration
+    ahead = udot - v * r
+    aside = vdot + u * r
+    return np.array(
+        [
+            m * ahead - static * r * r,
+            m * aside + static * rdot,
+            yaw * rdot + static * aside,
+        ]
+    )
 
 
 def _shares(motion: dict[str, Floats], structure: SharedStructure) -> Floats:

@@ -19,13 +19,7 @@ from numpy.typing import NDArray
 
 from identification.design.reduction import Reduction, backward_elimination
 from identification.samples.forces import FORCES, ForceRegression, force_regression
-from shipgym.manoeuvres.towing_tank import (
-    Tank,
-    pure_surge,
-    pure_sway,
-    pure_yaw,
-    yaw_with_drift,
-)
+from papers.captive import oscillate
 from shipgym.models import ShipModel
 from shipgym.ships import get_structure
 from shipgym.ships.particulars import Particulars
@@ -68,7 +62,6 @@ PARTICULARS = Particulars(
     yaw_gyradius=7.2,
     water_density=1025.0,
 )
-TANK = Tank(cycles=2, samples=500)
 # standard deviation of each force, in parts of its root mean square over all tests
 NOISE = 0.015
 SEED = 2020
@@ -203,22 +196,24 @@ def xu_ship(particulars: Particulars) -> ShipModel:
 def captive_tests() -> tuple[tuple[str, Trial], ...]:
     """Type and trial of each test, without noise."""
     ship, speed = xu_ship(PARTICULARS), PARTICULARS.require("speed")
-    rate = np.degrees(speed / PARTICULARS.length)
+    rate = speed / PARTICULARS.length
+
+    def test(course: Floats, amplitude: Floats, period: float) -> Trial:
+        return oscillate(ship, course, amplitude, period, cycles=2, samples=500)
+
+    ahead = np.array([speed, 0.0, 0.0])
+    surge, sway, yaw = np.eye(3)
     runs = [
-        ("surge", pure_surge(ship, part * speed, period, TANK))
-        for part, period in SURGE
+        ("surge", test(ahead, part * speed * surge, period)) for part, period in SURGE
     ]
-    runs += [
-        ("sway", pure_sway(ship, speed * np.tan(np.radians(a)), period, TANK))
-        for a, period in SWAY
-    ]
-    runs += [
-        ("yaw", pure_yaw(ship, prime * rate, period, TANK)) for prime, period in YAW
-    ]
-    runs += [
-        ("mixed", yaw_with_drift(ship, r * rate, a, MIXED_PERIOD, TANK))
-        for r, a in MIXED
-    ]
+    for angle, period in SWAY:
+        aside = speed * np.tan(np.radians(angle))
+        runs.append(("sway", test(ahead, aside * sway, period)))
+    runs += [("yaw", test(ahead, prime * rate * yaw, period)) for prime, period in YAW]
+    for prime, drift in MIXED:
+        angle = np.radians(drift)
+        course = speed * np.array([np.cos(angle), -np.sin(angle), 0.0])
+        runs.append(("mixed", test(course, prime * rate * yaw, MIXED_PERIOD)))
     return tuple(runs)
 
 

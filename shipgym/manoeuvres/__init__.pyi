@@ -1,4 +1,3 @@
-from . import towing_tank as towing_tank
 from .excitation import multi_sine_rudder as multi_sine_rudder
 from .excitation import prbs_rudder as prbs_rudder
 from .excitation import random_rudder_steps as random_rudder_steps

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from papers.captive import oscillate, tow
 from papers.xu2020_tank import PMM18, PMM38, TABLE_11, xu_ship
 
 import shipgym
@@ -19,14 +20,6 @@ from identification.samples.forces import (
     identify_forces,
 )
 from shipgym import InputError, Particulars, ShipModel, Trial
-from shipgym.manoeuvres.towing_tank import (
-    Tank,
-    pure_surge,
-    pure_sway,
-    pure_yaw,
-    static_drift,
-    yaw_with_drift,
-)
 from shipgym.ships.shared_structure import VR, Share, read_shares, shared_structure
 from shipgym.ships.structures import get_structure
 
@@ -45,20 +38,47 @@ SHIP = xu_ship(PARTICULARS)
 PRIME_MASS = 0.5 * 1025.0 * 28.9**3
 
 
+AHEAD = (5.0, 0.0, 0.0)
+PERIOD = 57.8  # s, 10 ship lengths
+
+
+def at_drift(drift_deg: float) -> tuple[float, float, float]:
+    angle = np.radians(drift_deg)
+    return 5.0 * float(np.cos(angle)), -5.0 * float(np.sin(angle)), 0.0
+
+
 @cache
 def tank_tests(noise: float = 0.0, model_inertia: bool = True) -> tuple[Trial, ...]:
-    tank = Tank(noise=noise, model_inertia=model_inertia)
-    runs = [
-        pure_surge(SHIP, 0.5, tank=tank),
-        pure_sway(SHIP, 0.5, tank=tank),
-        pure_sway(SHIP, 1.5, tank=tank),
-        pure_yaw(SHIP, 3.0, tank=tank),
-        pure_yaw(SHIP, 6.0, tank=tank),
-        yaw_with_drift(SHIP, 4.0, 6.0, tank=tank),
-        yaw_with_drift(SHIP, 4.0, -12.0, tank=tank),
-        static_drift(SHIP, [-15.0, -8.0, -4.0, 4.0, 8.0, 15.0], tank=tank),
+    """Surge, sway, yaw, yaw with drift and static drift; noise by each force's rms."""
+    slow, fast, mixed = np.radians([3.0, 6.0, 4.0])
+    swings = [
+        (AHEAD, (0.5, 0.0, 0.0)),
+        (AHEAD, (0.0, 0.5, 0.0)),
+        (AHEAD, (0.0, 1.5, 0.0)),
+        (AHEAD, (0.0, 0.0, slow)),
+        (AHEAD, (0.0, 0.0, fast)),
+        (at_drift(6.0), (0.0, 0.0, mixed)),
+        (at_drift(-12.0), (0.0, 0.0, mixed)),
     ]
-    return tuple(run.with_(name=f"{i}") for i, run in enumerate(runs))
+    runs = [
+        oscillate(SHIP, mean, amplitude, PERIOD, model_inertia=model_inertia)
+        for mean, amplitude in swings
+    ]
+    angles = [at_drift(angle) for angle in (-15.0, -8.0, -4.0, 4.0, 8.0, 15.0)]
+    velocity = np.repeat(angles, 200, axis=0)
+    t = 0.005 * np.arange(len(velocity))
+    runs.append(tow(SHIP, t, velocity, 0.0 * velocity, model_inertia))
+    return tuple(noisy(run, noise).with_(name=f"{i}") for i, run in enumerate(runs))
+
+
+def noisy(run: Trial, noise: float) -> Trial:
+    rng = np.random.default_rng(0)
+    channels = {name: run[name] for name in run.channels}
+    for name in "XYN":
+        force = channels[name]
+        size = np.sqrt(np.mean(force**2))
+        channels[name] = force + noise * size * rng.standard_normal(len(run))
+    return Trial(run.t, channels, kind="captive", length=run.length)
 
 
 def test_the_models_have_the_coefficients_of_the_paper() -> None:

@@ -19,13 +19,6 @@ def test_every_public_name_is_there(package):
         _ = package.weathr
 
 
-def test_wind_and_towing_tank_are_reached_by_their_names():
-    from shipgym.manoeuvres import towing_tank
-
-    assert shipgym.towing_tank is towing_tank
-    assert shipgym.Wind is shipgym.sea.Wind
-
-
 def test_the_import_registers_environments_and_loads_nothing_that_compiles():
     code = (
         "import sys, shipgym; sys.exit(any(name in sys.modules for name in ('numba',"
