@@ -7,8 +7,8 @@ from typing import Any
 
 import identification
 from identification.models.methods import METHODS
-from identification.options import AUTO
-from identification.reading import identify_arguments, read_table, settings_of
+from identification.pipeline.options import AUTO
+from identification.pipeline.reading import identify_arguments, read_table
 from shipgym import ShipFile, Trial
 from shipgym.checks import placed
 from shipgym.ships.structures import GREY_BOX
@@ -123,24 +123,18 @@ def compare_ship(
     ship : ShipFile
         Its trials are read.
     settings : mapping
-        From `identification_settings`; their method does not count, and their structure
-        where `structures` are named.
+        From `identification_settings`; their method and its settings do not count, nor
+        does their structure where `structures` are named.
     structures, methods : str or None
         Names with commas between them, or "all" for every method; None for the usual
         ones.
     """
-    of_methods = settings_of(settings, "method")
     others = {}
     for name, value in settings.items():
         stage, _, _ = name.partition(".")
         if stage not in ("method", "accept"):
             others[name] = value
     trials, arguments = trials_of(ship, others)
-    if EXTRA_TRIALS in settings:
-        extra = settings[EXTRA_TRIALS]
-        of_methods["extra_trials"] = [ship.trial(file) for file in extra]
-        trials = [trial for trial in trials if trial.name not in extra]
-
     if structures:
         arguments.pop("structure", None)
     with placed(str(ship.path)):
@@ -148,7 +142,6 @@ def compare_ship(
             trials,
             methods=list(METHODS) if methods == "all" else _names(methods),
             structures=_structures(structures, ship),
-            settings=of_methods,
             **arguments,
         )
 

@@ -62,15 +62,6 @@ from .estimators.recursive import (
 from .estimators.rm_svm import RMSVM as RMSVM
 from .estimators.search import SearchResult as SearchResult
 from .estimators.tuned import TunedLSSVM as TunedLSSVM
-from .judging.comparison import (
-    Comparison as Comparison,
-)
-from .judging.comparison import (
-    compare_methods as compare_methods,
-)
-from .judging.comparison import (
-    cross_validate as cross_validate,
-)
 from .judging.uncertainty import Uncertainty as Uncertainty
 from .models.coefficient_history import (
     CoefficientHistory as CoefficientHistory,
@@ -80,9 +71,20 @@ from .models.coefficient_history import (
 )
 from .models.prior_knowledge import PriorKnowledge as PriorKnowledge
 from .models.refinement import Refinement as Refinement
-from .options import Options as Options
 from .pipeline import identify as identify
-from .result import IdentificationResult as IdentificationResult
+from .pipeline.comparison import (
+    Comparison as Comparison,
+)
+from .pipeline.comparison import (
+    compare_methods as compare_methods,
+)
+from .pipeline.comparison import (
+    cross_validate as cross_validate,
+)
+from .pipeline.options import Options as Options
+from .pipeline.result import IdentificationResult as IdentificationResult
+from .report.figures import plots as plots
+from .report.page import write_report as write_report
 from .samples.forces import (
     ForceRegression as ForceRegression,
 )
@@ -92,6 +94,7 @@ from .samples.forces import (
 from .samples.forces import (
     identify_forces as identify_forces,
 )
+from .samples.prediction import predict as predict
 from .samples.preprocess import Preprocessing as Preprocessing
 from .samples.samples import Samples as Samples
 from .samples.samples import Sampling as Sampling

@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 from foreign_ships import KeptRows, Row, identified, sea_trials, ship_names, with_shaft
 
-from identification.judging.selection import STRUCTURES
+from identification.pipeline.choice import STRUCTURES
 from identification.samples.prediction import (
     predict,
     predicted_channels,

@@ -34,7 +34,7 @@ ROOMS: dict[str, tuple[float, int, str]] = {
     "identification.pipeline": (2, 0, "identify and its routes"),
     "identification.models": (4, 0, "refinement, priors"),
     "identification.judging": (3, 1, "prediction, choice, certainty"),
-    "identification.result": (1.6, 1, "what identify returns"),
+    "identification.pipeline.result": (1.6, 1, "what identify returns"),
     "identification.report": (0.2, 1, "pages, figures, summary"),
     "identification.estimators": (1.33, 2, "LS-SVM, recursive, others"),
     "identification.samples": (4, 2, "samples, preprocessing"),
@@ -53,9 +53,9 @@ ROOMS: dict[str, tuple[float, int, str]] = {
 }
 #: Files that are drawn apart from the room they lie in.
 APART = {
-    "identification.fit": "identification.result",
-    "identification.options": "identification.result",
-    "identification.text": "identification.result",
+    "identification.judging.fit": "identification.pipeline.result",
+    "identification.pipeline.options": "identification.pipeline.result",
+    "identification.text": "identification.pipeline.result",
     "shipgym.engine.episodes": "shipgym.episodes",
     "shipgym.engine.episode_program": "shipgym.episodes",
     "shipgym.engine.hooks": "shipgym.episodes",
@@ -64,7 +64,7 @@ APART = {
     "agents.job_results": "agents.jobs",
 }
 TITLES = {
-    "identification.result": "result.py, fit.py",
+    "identification.pipeline.result": "result.py, fit.py",
     "shipgym.episodes": "engine/episodes.py",
     "agents.jobs": "jobs.py, job_results.py",
 }

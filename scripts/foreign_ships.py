@@ -17,7 +17,8 @@ if str(ROOT) not in sys.path:
 
 import shipgym  # noqa: E402 - the folder above has to be found first
 from identification import IdentificationResult, identify  # noqa: E402
-from identification.judging.selection import RESPONSES, whole_trials  # noqa: E402
+from identification.judging.selection import RESPONSES  # noqa: E402
+from identification.models.refinement import whole_trials  # noqa: E402
 from shipgym import Sensors, ShipModel, Trial  # noqa: E402
 from shipgym.errors import InputError  # noqa: E402
 from shipgym.manoeuvres import zigzag  # noqa: E402

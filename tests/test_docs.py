@@ -28,7 +28,7 @@ import sklearn.linear_model  # noqa: F401 - what many pages need is loaded once,
 from plotly.basedatatypes import BaseFigure
 
 import identification.pipeline
-import identification.result  # noqa: F401
+import identification.pipeline.result  # noqa: F401
 from shipgym import example_ship
 
 ROOT = Path(__file__).parents[1]

@@ -99,11 +99,14 @@ def _identify(
     from agents.identifying import identify_ship
     from agents.output import whole_folder
     from identification.judging.warnings import held_out_error, why_unstable
-    from identification.result import FILES
+    from identification.pipeline.result import FILES
+    from identification.report.page import write_report
 
     with whole_folder(out, FILES) as draft, identifying("identifying"):
         result = identify_ship(read, settings)
-        result.save(draft, report)
+        result.save(draft)
+        if report:
+            write_report(result, draft)
         written = [name for name in FILES if (draft / name).exists()]
     instability = why_unstable(result)
     answer(
@@ -152,7 +155,7 @@ def _compare(
     from agents.cli.terminal import answer, console, identifying, say, warn
     from agents.identifying import compare_ship
     from agents.output import whole_folder
-    from identification.judging.comparison import COMPARISON_FILES
+    from identification.pipeline.comparison import COMPARISON_FILES
 
     own = () if read.structure is None else (f"model-{read.structure.name}.json",)
     with (
@@ -163,14 +166,9 @@ def _compare(
         found.save(draft)
     answer(found.to_dict())
     console.print(selection_table(found.to_dict()))
-    say(f"\nwritten to {out}: comparison.json, comparison.html, models")
+    say(f"\nwritten to {out}: comparison.json, models")
     for name, reason in found.refused.items():
         warn(f"{name} was not fitted: {reason}")
-    for name, left in found.left_out.items():
-        warn(
-            f"{name} has no setting of these names and was fitted without them:"
-            f" {', '.join(left)}"
-        )
     first = found.ranked[0]
     if not first.stable or first.error is None:
         fail(
@@ -239,7 +237,8 @@ def reduce_command(
     from agents.cli.terminal import answer, console, identifying, say
     from agents.identifying import reduce_ship
     from agents.output import whole_folder
-    from identification.result import FILES
+    from identification.pipeline.result import FILES
+    from identification.report.page import write_report
     from shipgym.files import write_json
 
     read, settings = _chosen(ship, options, "abkowitz")
@@ -249,7 +248,9 @@ def reduce_command(
     ):
         found = reduce_ship(read, settings, direction, tolerance)
         fields = found.to_dict()
-        found.reduced.save(draft, report)
+        found.reduced.save(draft)
+        if report:
+            write_report(found.reduced, draft)
         write_json(fields, draft / "reduction.json")
     answer(fields)
     for q, reduction in found.reductions.items():

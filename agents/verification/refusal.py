@@ -10,7 +10,7 @@ from agents.verification.closed_loop import MOST_LOST, loses_too_many
 from agents.verification.result import Verification
 from agents.verification.tracks import Track
 from identification.design.experiment import advise
-from identification.fit import Fit
+from identification.judging.fit import Fit
 from shipgym.arrays import Flags, Floats
 from shipgym.errors import InputError
 from shipgym.models import ShipModel

@@ -26,7 +26,7 @@ from identification.design.information import (
     uncertainty,
 )
 from identification.design.sensitivity import table_of
-from identification.judging.hard_turn import hard_turn_features
+from identification.models.hard_turn import hard_turn_features
 from identification.text import as_text, lined_table
 from shipgym import InputError, ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats

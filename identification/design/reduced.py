@@ -12,7 +12,7 @@ from identification.design.reduction import (
 )
 from identification.design.sensitivity import zigzag_sensitivity
 from identification.pipeline import identify
-from identification.result import IdentificationResult
+from identification.pipeline.result import IdentificationResult
 from identification.samples.samples import Samples
 from shipgym import InputError, Trial, list_structures, register_structure
 from shipgym.arrays import finite

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.fit import Fit
+from identification.judging.fit import Fit
 from shipgym import InputError
 from shipgym.checks import check_number, check_table, quoted
 

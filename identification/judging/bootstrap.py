@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from sklearn.base import clone
 
+from identification.estimators.covariance import residuals
 from identification.estimators.estimator import Estimator, Estimators
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.threads import single_threaded
-from identification.judging.covariance import residuals
 from identification.progress import counted
 from identification.samples.samples import Samples
 from shipgym.arrays import Floats, Integers

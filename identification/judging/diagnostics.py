@@ -8,8 +8,8 @@ import numpy as np
 from scipy.signal import correlate
 
 from identification.arrays import by_name, column_rms, root_mean_square
+from identification.estimators.covariance import residuals
 from identification.estimators.estimator import Estimator, Estimators
-from identification.judging.covariance import residuals
 from identification.samples.samples import Samples
 from shipgym.arrays import Floats, Integers
 from shipgym.ships import Structure

@@ -6,7 +6,6 @@ of the manoeuvre, by the model of the others and by models drawn from its covari
 standard errors are scaled until these errors are of size one.
 """
 
-import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -17,9 +16,7 @@ from scipy.optimize import brentq
 from scipy.stats import t as student
 
 from identification.arrays import mean_square, root_mean_square
-from identification.estimators.estimator import Estimator, Estimators, weights
 from identification.judging.closed_loop import closed_loop
-from identification.judging.covariance import residuals
 from identification.judging.prediction import ZIGZAG, index_reader
 from identification.samples.prediction import (
     COMPARED,
@@ -29,9 +26,8 @@ from identification.samples.prediction import (
 )
 from identification.samples.preprocess import smoothed_channels
 from identification.samples.preprocess.noise import noise_level
-from identification.samples.samples import Samples
 from shipgym import ShipModel, Trial
-from shipgym.arrays import Flags, Floats
+from shipgym.arrays import Floats
 from shipgym.trials.resampling import usual_step
 
 FEWEST_TRIALS = 3  # to leave one out and learn something from it
@@ -56,66 +52,6 @@ class ErrorSizes(NamedTuple):
     factor: float  # root mean square of those by kind; 0 without any
     by_kind: dict[str, float]  # of the motion and of indices
     predicted: int  # number of trials that could be predicted
-
-
-def without_trial(
-    estimators: Estimators,
-    samples: Samples,
-    trial: int,
-) -> tuple[Estimators, Samples]:
-    """Estimators as if fitted without a trial, and the rows of the others."""
-    return without_trials(estimators, samples, [trial])
-
-
-def without_trials(
-    estimators: Estimators,
-    samples: Samples,
-    trials: Sequence[int],
-) -> tuple[Estimators, Samples]:
-    """Estimators as if fitted without some trials, and the rows of the others.
-
-    Exact for linear estimators that keep their directions and penalty: the normal
-    equations less the rows left out.
-    """
-    errors = residuals(estimators, samples)
-    out = np.isin(samples.trial, trials)
-    found = {}
-    for q, estimator in estimators.items():
-        found[q] = _without_rows(
-            estimator,
-            features=samples.features[q],
-            errors=errors[q],
-            out=out,
-        )
-    return found, samples.select(~out)
-
-
-def _without_rows(
-    estimator: Estimator,
-    features: Floats,
-    errors: Floats,
-    out: Flags,
-) -> Estimator:
-    """An estimator less the rows of its normal equations that are `out`.
-
-    With M the inverse moment of all, that of the others is (1 - M X'W X)^-1 M, with the
-    features X and weights W of the rows left out.
-    """
-    counts = weights(estimator, features)
-    M = estimator.inverse_moment_
-    X = features[out]
-    XW = X.T * counts[out]
-    change = np.linalg.pinv(np.eye(len(M)) - M @ XW @ X)
-
-    inverse = change @ M
-    moved = XW @ errors[out]
-
-    found = copy.copy(estimator)
-    found.coef_ = estimator.coef_ - inverse @ moved
-    found.inverse_moment_ = inverse
-    if hasattr(estimator, "weights_"):
-        found.weights_ = counts[~out]  # type: ignore[attr-defined]
-    return found
 
 
 def model_error(

@@ -11,13 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from identification.judging.covariance import joint_covariance
-from identification.judging.guard import with_coefficients
+from identification.estimators.covariance import joint_covariance, without_trial
 from identification.judging.model_error import (
     DEFAULT,
     FEWEST_TRIALS,
-    without_trial,
 )
+from identification.models.guard import with_coefficients
 from identification.models.methods import fit_all, get_method
 from identification.samples.problem import Problem
 from shipgym import InputError, ShipModel
@@ -171,25 +170,3 @@ def _jackknife(left_out: Sequence[Floats]) -> Floats:
     scatter = np.array(left_out) - np.mean(left_out, axis=0)
     inflation = (n_trials - 1) / n_trials
     return np.asarray(inflation * (scatter.T @ scatter))
-
-
-def bias_sentences(bias: dict[str, Any] | None) -> list[str]:
-    """The bias in words; none where there is none."""
-    if bias is None:
-        return []
-    angle, error = bias["angle_deg"], bias["standard_error_deg"]
-    side = "starboard" if angle > 0.0 else "port"
-    margin = 1.96 * error
-    found = (
-        f"Rudder bias: the ship runs straight with {abs(angle):.2g} ± {margin:.2g} deg"
-        f" (95 %) to {side}"
-    )
-    if not bias["significant"]:
-        return [f"{found}, which does not differ from zero."]
-    if bias["in_model"]:
-        return [f"{found}; the model has it."]
-    structure = bias["structure"]
-    return [
-        f"{found}, by {structure}; the structure has no constant for it: it belongs to"
-        f" the rudder's zero, or take structure {structure!r}."
-    ]

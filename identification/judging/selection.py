@@ -1,24 +1,16 @@
-"""Which structure and method predict held-out trials best, for `structure = "auto"`."""
+"""Which fit predicts trials held out best: errors of each, and the choice."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from identification.arrays import root_mean_square
-from identification.judging.extrapolation import holds_turn, largest_rudders
-from identification.judging.ranking import RankedFit, fit_name
-from identification.judging.rudder_bias import with_bias
-from identification.judging.usual_hull import with_usual_hull
-from identification.models.refinement import whole_trials
-from identification.models.similarity import AUTO
-from identification.options import MAP, Options, name_of
-from identification.progress import counted
-from identification.result import IdentificationResult
-from identification.samples.folds import pieces
+from identification.judging.extrapolation import largest_rudders
+from identification.judging.fit import Fit
 from identification.samples.prediction import predict, predicts_track
-from shipgym import InputError, Particulars, ShipModel, Trial
+from shipgym import ShipModel, Trial
 from shipgym.arrays import Integers
 from shipgym.ships.structures import GREY_BOX, MMG
 from shipgym.trials.resampling import usual_step
@@ -26,20 +18,11 @@ from shipgym.trials.resampling import usual_step
 #: Of few coefficients, those with the bias of the rudder last; by the simulated motion
 #: of whole trials, in which a small bias shows, too.
 RESPONSES = ("nomoto", "norrbin", "nomoto-bias", "norrbin-bias")
-TABLES = (
-    *RESPONSES,
-    "nomoto2",
-    "linear-steering",
-    "steering7",
-    "abkowitz",
-    "abkowitz-full",
-    "cubic",
-    "mmg4dof",
-)
-STRUCTURES = (*TABLES, GREY_BOX, MMG)
-RM_SVM = "rm-svm"
 #: Methods that a table that predicts best is also fitted by; quick ones.
 OTHERS = ("ls", "cv-lssvr")
+
+#: Metrics of trials by their names, see `prediction.trial_metrics`.
+Metrics = Mapping[str, Mapping[str, Any]]
 
 
 class Fitted(Protocol):
@@ -64,105 +47,56 @@ class Fitted(Protocol):
     def without(self, trials: Sequence[int]) -> ShipModel:
         """The model of the other trials, by their places."""
 
-    def result(
-        self, options: Options, sea: Mapping[str, Any] | None = None
-    ) -> IdentificationResult:
-        """The model with uncertainty and predictions."""
+
+@dataclass(frozen=True)
+class RankedFit:
+    """Errors of a method on the trials held out."""
+
+    structure: str  # of its model
+    method: str  # its name
+    coefficients: int  # their number
+    stable: bool  # whether its model passed the guard
+    ran_away: int  # trials held out on which its simulation ran away
+    #: root mean square error of the simulated u, v, r and psi by the standard deviation
+    #: of what was measured, mean over channels and trials: 0 for perfect, 1 for no
+    #: better than a constant. None where one ran away
+    error: float | None
+    #: root mean square error, mean over the trials on which it did not run away
+    heading_deg: float | None
+    yaw_rate_deg_s: float | None
+    errors: dict[str, float | None]  # `error` of each trial
+    #: whether it explains half of the variance of the speed in trials held out
+    predicts_speed: bool = False
+
+    @property
+    def rank(self) -> tuple[Any, ...]:
+        """Sort key: first those that never run away, then by the error."""
+        return self.ran_away, not self.stable, self.error is None, self.error or 0.0
 
 
-#: From trials and options of a structure that is named to its fit.
-Fit = Callable[[Sequence[Trial], Options], Fitted]
+def fit_name(structure: str, method: str) -> str:
+    """A structure fitted by a method, in words."""
+    return f"{structure} by {method}"
 
 
-class Choice(NamedTuple):
-    """The structure and method that predict best."""
-
-    options: Options
-    fit: Fitted  # of all trials
-    report: dict[str, Any]  # the ranking, for the provenance
-
-
-def select(
-    fit: Fit,
-    trials: Sequence[Trial],
-    options: Options,
-    structures: Sequence[str] = STRUCTURES,
-) -> Choice:
-    """The structure and method that predict the heading of trials held out best.
-
-    Every structure that trials and particulars allow is fitted by its usual method,
-    those of few coefficients by output error too, a table that comes first by others,
-    and each trial (each third of a single one) predicted by fits without it; those of
-    the largest rudder also by fits to the trials of less rudder. The choice is the one
-    with the fewest coefficients whose error exceeds the least by no more than one
-    standard error of their difference over the trials (a quarter at most), or by 2 %. A
-    method other than the default is the only one, and what does not know a setting is
-    refused; InputError where nothing can be fitted, with the first reason.
-    """
-    to_fit = [trial for trial in trials if trial.use == "fit"]
-    parts = list(trials)
-    held_out = "each trial in turn"
-    single = len(to_fit) == 1
-    if single:
-        parts = [part.with_(kind=None) for part in pieces(to_fit[0])]
-        held_out = "each third of the only trial"
-    attempts = _Attempts(fit, parts, options)
-    attempts.add_all(structures)
-
-    ranked = attempts.by_rank()
-    windy = in_wind(parts)
-    best = simplest(ranked, windy)
-    turns: dict[str, Any] = {"shown_by": "a trial that turns"}
-    if not holds_turn(to_fit):
-        by_error = best
-        best = simplest(shown_to_turn(ranked, options), windy)
-        turns = _turns(best, by_error)
-    others = [other for other in ranked if other is not best]
-    report = {
-        "held_out": held_out,
-        "ranking": [asdict(one) for one in (best, *others)],
-        "refused": attempts.refused,
-        "turns": turns,
-    }
-    own, whole = attempts.fits[fit_name(best.structure, best.method)]
-    if single:
-        whole = fit(trials, own)
-    found = Choice(own, whole, report)
-    if options.rudder_bias == "none":
-        return found
-    biased = f"{best.structure}-bias"
-    if biased in structures and options.method_is_default:
-        return _response_with_bias(found, biased, fit, trials)
-    return _with_bias(found, fit, trials)
-
-
-def _with_bias(choice: Choice, fit: Fit, trials: Sequence[Trial]) -> Choice:
-    """The same table with a constant, where it has none and the bias differs from 0."""
-    table = with_bias(choice.fit.model, choice.fit.problem)
-    if table is None:
-        return choice
-    options = replace(choice.options, structure=table)
-    other = fit(trials, options)
-    return Choice(options, other, choice.report) if other.stable else choice
-
-
-def shown_to_turn(ranked: Sequence[RankedFit], options: Options) -> list[RankedFit]:
+def shown_to_turn(
+    ranked: Sequence[RankedFit], held: Sequence[str] = ()
+) -> list[RankedFit]:
     """The fits that are known to turn where no trial does; all where none is.
 
     Those of few parameters, and those that a prior, formulas or a reference ship hold
-    in a hard turn. The terms of a table that zigzags fix are not known beyond them.
+    in a hard turn, `held` among them. The terms of a table that zigzags fix are not
+    known beyond them.
     """
-    held = {*RESPONSES, GREY_BOX, MMG}
-    if options.prior is not None:
-        held.update(TABLES)
     known = []
     for fit in ranked:
-        if fit.structure in held and not fit.ran_away:
+        turns = fit.structure in (*RESPONSES, GREY_BOX, MMG, *held)
+        if turns and not fit.ran_away:
             known.append(fit)
     return known or list(ranked)
 
 
-def _turns(taken: RankedFit, by_error: RankedFit) -> dict[str, Any]:
+def what_turns(taken: RankedFit, by_error: RankedFit) -> dict[str, Any]:
     """What holds a hard turn of the fit that is taken, where no trial turns.
 
     `by_error`: the fit that would be taken by its error alone.
@@ -178,89 +112,6 @@ def _turns(taken: RankedFit, by_error: RankedFit) -> dict[str, Any]:
     return {"shown_by": shown_by, "predicts_better": passed_over}
 
 
-def _response_with_bias(
-    choice: Choice, structure: str, fit: Fit, trials: Sequence[Trial]
-) -> Choice:
-    """The same structure with the bias of the rudder, where that differs from 0.
-
-    By the standard error of the bias in the fit to all trials: in what is predicted
-    from the start of a short piece it hardly shows.
-    """
-    options = replace(choice.options, structure=structure, method=whole_trials())
-    other = fit(trials, options)
-    bias = other.result(options).metrics.get("rudder_bias")
-    report = choice.report | {"rudder_bias": bias}
-    if bias is None or not bias["significant"] or not other.stable:
-        return choice._replace(report=report)
-    return Choice(options, other, report)
-
-
-@dataclass(frozen=True, eq=False)
-class _Attempts:
-    """Structures and methods that were tried on the same trials."""
-
-    fit: Fit
-    trials: Sequence[Trial]
-    options: Options
-    ranked: list[RankedFit] = field(default_factory=list)
-    refused: dict[str, str] = field(default_factory=dict)  # why, by name
-    fits: dict[str, tuple[Options, Fitted]] = field(default_factory=dict)  # by name
-
-    def add_all(self, structures: Sequence[str]) -> None:
-        """Try structures, each by its usual methods, the best table by others too.
-
-        Raises InputError where none can be fitted.
-        """
-        free = self.options.method_is_default
-        for structure in counted("structures", structures):
-            if not free:
-                self.add(structure, self.options.method)
-                continue
-            usual, *_ = methods_of(structure, self.options.method)
-            self.add(structure, usual)
-            if structure in RESPONSES:
-                self.add(structure, whole_trials())
-        if not self.ranked:
-            first_reason = next(iter(self.refused.values()))
-            raise InputError(first_reason)
-
-        best, *_ = self.by_rank()
-        if free and best.structure in TABLES and best.structure not in RESPONSES:
-            for method in OTHERS:
-                self.add(best.structure, method)
-
-    def add(self, structure: str, method: Any) -> None:
-        """Try a structure and a method, or remember why it cannot be fitted."""
-        reference = reference_of(structure, self.options.reference_model)
-        own = replace(
-            self.options,
-            structure=structure,
-            method=method,
-            reference_model=reference,
-        )
-        if structure in (GREY_BOX, MMG) and own.particulars is not None:
-            own = replace(own, particulars=_of_usual_hull(own.particulars))
-        name = fit_name(structure, MAP if structure == MMG else name_of(method))
-        try:
-            found = self.fit(self.trials, own)
-            self.ranked.append(_ranked(own, found))
-        except InputError as error:
-            self.refused[name] = str(error)
-        else:
-            self.fits[name] = own, found
-
-    def by_rank(self) -> list[RankedFit]:
-        """The fits, the best first."""
-        return sorted(self.ranked, key=lambda fit: fit.rank)
-
-
-def _of_usual_hull(given: Particulars | Mapping[str, Any]) -> Particulars:
-    """Particulars by which a reference ship or formulas are found."""
-    if not isinstance(given, Particulars):
-        given = Particulars.from_mapping(given)
-    return with_usual_hull(given)
-
-
 class HeldOut(NamedTuple):
     """Errors of the prediction of a trial held out."""
 
@@ -272,8 +123,8 @@ class HeldOut(NamedTuple):
     speed: float  # of the surge speed, by its standard deviation
 
 
-def _ranked(options: Options, fit: Fitted) -> RankedFit:
-    """Rank of a fit, by what it predicts of trials held out."""
+def rank_by_turns(structure: str, method: str, fit: Fitted) -> RankedFit:
+    """Rank of a fit, by what it predicts of its own trials, each held out in turn."""
     trials = fit.problem.used
     seen: dict[str, list[HeldOut | None]] = {trial.name: [] for trial in trials}
     for group in _groups(trials):
@@ -294,9 +145,8 @@ def _ranked(options: Options, fit: Fitted) -> RankedFit:
         yaw_rate = float(np.degrees(np.mean([error.yaw_rate for error in known])))
     if known and not ran_away:
         mean_error = float(np.mean(list(errors.values())))
-    method = MAP if options.structure == MMG else name_of(options.method)
     return RankedFit(
-        structure=name_of(options.structure),
+        structure=structure,
         method=method,
         coefficients=fit.free_coefficients,
         stable=fit.stable,
@@ -379,24 +229,6 @@ def _mean_error(found: Sequence[HeldOut | None]) -> float | None:
     return float(np.mean(known))
 
 
-def methods_of(structure: str, usual: str) -> tuple[str, ...]:
-    """Methods that a structure is fitted by where none are named, the usual first."""
-    if structure == GREY_BOX:
-        return (RM_SVM,)
-    if structure == MMG:
-        return (usual,)
-    return (usual, *OTHERS)
-
-
-def reference_of(structure: str, named: Any) -> Any:
-    """The reference ship of a structure that knows one, as named; None for others."""
-    if structure == GREY_BOX:
-        return named or AUTO
-    if structure == MMG:
-        return named
-    return None
-
-
 def simplest(ranked: Sequence[RankedFit], in_wind: bool = False) -> RankedFit:
     """The fit of fewest coefficients whose errors differ from the first's by chance.
 
@@ -451,3 +283,64 @@ def _differs_by_chance(fit: RankedFit, first: RankedFit) -> bool:
     by_chance = min(standard_error, 0.25 * least)
     nothing = 0.02 * least
     return bool(excess <= max(by_chance, nothing))
+
+
+def ranked_fit(
+    results: Sequence[Fit], seen: Metrics, trials: Sequence[Trial]
+) -> RankedFit:
+    """Rank of a method that gave `results`, by what it predicts of trials.
+
+    `seen`: metrics of those held out, by name.
+    """
+    errors = {}
+    for trial in trials:
+        if trial.name in seen:
+            errors[trial.name] = _relative_error(seen[trial.name], trial)
+    known = [error for error in errors.values() if error is not None]
+    mean_error = None
+    if len(known) == len(errors):
+        mean_error = float(np.mean(known))
+
+    first = results[0]
+    provenance = first.model.provenance or {}
+    return RankedFit(
+        structure=provenance["structure"],
+        method=provenance["method"],
+        coefficients=len(first.coefficients),
+        stable=all(result.stable for result in results),
+        ran_away=sum(metrics["diverged"] for metrics in seen.values()),
+        error=mean_error,
+        heading_deg=_mean_degrees(seen, "psi"),
+        yaw_rate_deg_s=_mean_degrees(seen, "r"),
+        errors=errors,
+    )
+
+
+def _relative_error(metrics: Mapping[str, Any], trial: Trial) -> float | None:
+    """Mean error of the channels by their standard deviation.
+
+    None where the simulation ran away.
+    """
+    ratios = []
+    for name, error in metrics["rmse"].items():
+        if error is None:
+            continue
+        deviation = float(np.std(trial[name]))
+        if deviation > 0.0:
+            ratio = error / deviation
+            ratios.append(ratio)
+    if not ratios:
+        return None
+    return float(np.mean(ratios))
+
+
+def _mean_degrees(seen: Metrics, channel: str) -> float | None:
+    """Mean over the trials of the error of an angle, degrees; None for none known."""
+    known = []
+    for metrics in seen.values():
+        error = metrics["rmse"][channel]
+        if error is not None:
+            known.append(error)
+    if not known:
+        return None
+    return float(np.degrees(np.mean(known)))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.fit import Fit
+from identification.judging.fit import Fit
 from shipgym import InputError, ShipModel, Trial
 from shipgym.models.linear import is_course_stable, steering_state_space
 

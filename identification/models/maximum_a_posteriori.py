@@ -14,9 +14,7 @@ from identification.models.hull_formulas import YOSHIMURA
 from identification.models.mmg_prior import MMGPrior, mmg_prior
 from identification.models.posterior import Estimate, HeldOutError, Posterior
 from identification.models.prior_knowledge import PriorKnowledge
-from identification.options import MAP, Options, name_of
-from identification.samples.problem import Problem
-from shipgym import InputError, ShipModel
+from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.ships.mmg import IDENTIFIED
@@ -27,35 +25,6 @@ class _Candidate(NamedTuple):
 
     estimate: Estimate
     held_out: HeldOutError
-
-
-def checked_mmg(options: Options) -> Options:
-    """The options of an identification of the MMG form.
-
-    Raises InputError for those that it does not have.
-    """
-    if not (options.method_is_default or options.method == MAP):
-        raise InputError(
-            "method: expected none with structure 'mmg', got"
-            f" {name_of(options.method)!r}; it is not linear in its coefficients and is"
-            " fitted by simulation error with a prior: leave the method and its"
-            " settings out, or choose another structure"
-        )
-    covariance = options.uncertainty.covariance
-    if covariance == "bootstrap":
-        raise InputError(
-            "uncertainty: expected 'analytic' or 'posterior' with structure 'mmg', got"
-            f" {covariance!r}; leave it out, or choose another structure"
-        )
-    prior = None if options.prior is None else options.prior.source
-    if prior is not None and options.reference_model is not None:
-        raise InputError(
-            "reference_model: expected it without prior, got"
-            f" {name_of(options.reference_model)!r} and prior {name_of(prior)!r}; the"
-            " coefficients of structure 'mmg' are pulled to one reference ship, or to"
-            " formulas"
-        )
-    return replace(options, method=MAP)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,20 +55,18 @@ class MMGFit:
         return self.posterior.model(z)
 
 
-def fit_mmg(problem: Problem, options: Options) -> MMGFit:
+def fit_mmg(blank: ShipModel, trials: Sequence[Trial], asked: PriorKnowledge) -> MMGFit:
     """The MMG form of greatest probability, with its covariance, and a report.
 
-    Options by `checked_mmg`. The prior is that of the `reference_model`, or of `prior`:
-    a reference ship, or formulas, by default those of Yoshimura & Masumoto 2012. By its
-    strength its standard deviations are divided; by default it is the strongest of 1,
-    2, 3 whose error, each trial predicted from the others, is within a tenth of the
-    least. The report is for the provenance.
+    The prior is a reference ship, or formulas, by default those of Yoshimura & Masumoto
+    2012. By its strength its standard deviations are divided; by default it is the
+    strongest of 1, 2, 3 whose error, each trial predicted from the others, is within a
+    tenth of the least. The report is for the provenance.
     """
-    asked = options.prior or PriorKnowledge()
-    source = options.reference_model or asked.source or YOSHIMURA
-    posterior = _posterior(problem, source)
-    strengths = _strengths(asked)
-    candidates = _candidates(posterior, strengths)
+    prior = mmg_prior(asked.source or YOSHIMURA, blank.particulars)
+    ship = replace(blank, particulars=prior.ship)
+    posterior = Posterior(ship, trials, prior)
+    candidates = _candidates(posterior, _strengths(asked))
     errors = [candidate.held_out.error for candidate in candidates]
     best = strongest_as_good(errors)
     chosen = candidates[best]
@@ -116,14 +83,6 @@ def _chosen_model(posterior: Posterior, chosen: _Candidate) -> ShipModel:
     model = posterior.model(estimate.z)
     covariance = _coefficient_covariance(posterior.prior, widened)
     return replace(model, covariance=covariance)
-
-
-def _posterior(problem: Problem, source: str | ShipModel) -> Posterior:
-    """The trials to fit, and the prior of a reference ship or of formulas."""
-    blank = problem.blank
-    prior = mmg_prior(source, blank.particulars)
-    ship = replace(blank, particulars=prior.ship)
-    return Posterior(ship, problem.used, prior)
 
 
 def _strengths(asked: PriorKnowledge) -> tuple[float, ...]:

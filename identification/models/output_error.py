@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.judging.covariance import newey_west
+from identification.estimators.covariance import newey_west
 from identification.models.least_squares import (
     Linearised,
     fit_least_squares,

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.judging.hard_turn import hard_turn_features
 from identification.models.formulas import formula_coefficients
+from identification.models.hard_turn import hard_turn_features
 from identification.models.methods import fit_all, get_method
 from identification.models.similarity import AUTO, select_reference
 from identification.samples.samples import Samples, build_samples

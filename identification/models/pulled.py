@@ -13,8 +13,8 @@ import numpy as np
 
 from identification.arrays import by_name, mean_square
 from identification.estimators.estimator import Estimator, Estimators, FitTask
-from identification.judging.guard import reasons_unstable, with_coefficients
 from identification.models.formulas import FORMULAS
+from identification.models.guard import reasons_unstable, with_coefficients
 from identification.models.methods import Method
 from identification.models.prior import Prior, formula_prior, reference_prior
 from identification.models.prior_knowledge import PriorKnowledge

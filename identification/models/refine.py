@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.arrays import by_name, column_rms, root_mean_square
 from identification.estimators.estimator import Estimators, FitTask
-from identification.judging.guard import GuardedFit, reasons_unstable
+from identification.models.guard import GuardedFit, reasons_unstable
 from identification.models.output_error import OutputError, Solution
 from identification.models.prior import reference_turns
 from identification.models.refinement import Refinement

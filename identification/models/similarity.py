@@ -12,6 +12,7 @@ from shipgym import InputError, Particulars, ShipModel, load_model
 from shipgym.arrays import Floats
 from shipgym.checks import quoted
 from shipgym.models.catalogue import REFERENCE_SHIPS
+from shipgym.ships.particulars import with_estimates
 
 AUTO = "auto"
 # correlation below which a reference ship is unlike a ship, and not taken unnamed
@@ -158,3 +159,23 @@ def _with_rudder_area(name: str, ship: ShipModel) -> Particulars:
         return p
     area = by_length_and_draught[name] * p.length * p.draught
     return replace(p, rudder_area=area)
+
+
+def with_usual_hull(ship: Particulars) -> Particulars:
+    """Particulars with absent beam, draught and block coefficient of a usual hull.
+
+    A beam of L / 6.2, a draught of B / 2.7 and a block coefficient of 0.75 lie between
+    those of tankers and container ships; marked as estimated. Boats below 30 m differ
+    too much, and keep what is known.
+    """
+    shortest = 30.0
+    if ship.length < shortest:
+        return ship
+    return with_estimates(
+        ship,
+        {
+            "beam": lambda known: known.length / 6.2,
+            "draught": lambda known: known.require("beam") / 2.7,
+            "block_coefficient": lambda known: 0.75,
+        },
+    )

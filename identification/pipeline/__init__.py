@@ -8,10 +8,10 @@ from identification.estimators.threads import single_threaded
 from identification.judging.acceptance import unaccepted
 from identification.judging.uncertainty import Uncertainty
 from identification.models.prior_knowledge import PriorKnowledge
-from identification.options import AUTO, Given, Options, stage
 from identification.pipeline.by_regression import by_regression
+from identification.pipeline.options import AUTO, Given, Options, stage
+from identification.pipeline.result import IdentificationResult
 from identification.progress import announce
-from identification.result import IdentificationResult
 from identification.samples.preprocess import Preprocessing
 from identification.samples.samples import Sampling
 from shipgym import ShipModel, SteeringGear, Trial

@@ -8,24 +8,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from identification.estimators.covariance import without_trials
 from identification.estimators.estimator import FitTask
-from identification.judging.guard import (
+from identification.judging.rudder_bias import with_bias
+from identification.models.guard import (
     GuardedFit,
     guarded_fit,
     with_coefficients,
 )
-from identification.judging.model_error import without_trials
-from identification.judging.rudder_bias import with_bias
 from identification.models.methods import Method, get_method
 from identification.models.refinement import Refinement, whole_trials
-from identification.options import Options, name_of
 from identification.pipeline.evaluation import (
     MEMORY,
     provenance_of,
     with_uncertainty,
 )
+from identification.pipeline.options import Options, name_of
 from identification.pipeline.pose import pose
-from identification.result import IdentificationResult
+from identification.pipeline.result import IdentificationResult
 from identification.samples.prediction import is_yaw_alone
 from identification.samples.problem import Problem, held_out
 from shipgym import ShipModel, Trial, list_structures

@@ -9,32 +9,32 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import shipgym
+from identification.estimators.covariance import (
+    coefficient_covariance,
+    joint_covariance,
+    without_trial,
+)
 from identification.judging.bootstrap import (
     bootstrap_covariance,
     influence_covariance,
 )
-from identification.judging.covariance import (
-    coefficient_covariance,
-    joint_covariance,
-)
 from identification.judging.diagnostics import diagnose
 from identification.judging.extrapolation import Without, beyond_trials
-from identification.judging.guard import GuardedFit, with_coefficients
 from identification.judging.model_error import (
     FEWEST_TRIALS,
     model_error,
-    without_trial,
 )
 from identification.judging.prediction import trial_metrics
 from identification.judging.rudder_bias import rudder_bias
 from identification.judging.uncertainty import Uncertainty
-from identification.options import (
+from identification.models.guard import GuardedFit, with_coefficients
+from identification.pipeline.options import (
     Options,
     name_of,
     provenance_settings,
     whole_call,
 )
-from identification.result import IdentificationResult
+from identification.pipeline.result import IdentificationResult
 from identification.samples.prediction import is_yaw_alone, predict
 from identification.samples.problem import Problem
 from identification.samples.samples import Samples

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.options import Given, Options, name_of
+from identification.pipeline.options import Given, Options, name_of
 from identification.samples.checks import check_samples, check_trials
 from identification.samples.preprocess import repaired
 from identification.samples.problem import Problem, held_out

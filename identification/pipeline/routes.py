@@ -11,9 +11,8 @@ from identification.estimators.estimator import Estimators
 from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.rm_svm import RMSVM
 from identification.judging.extrapolation import beyond_trials
-from identification.judging.guard import GuardedFit, reasons_unstable
-from identification.judging.selection import select
 from identification.models.grey_box import explained_samples
+from identification.models.guard import GuardedFit, reasons_unstable
 from identification.models.kernel_fit import (
     INPUT_CHANNELS,
     KernelFit,
@@ -23,22 +22,23 @@ from identification.models.kernel_fit import (
 )
 from identification.models.maximum_a_posteriori import (
     MMGFit,
-    checked_mmg,
     fit_mmg,
 )
-from identification.options import AUTO, MAP, Options, name_of, whole_call
+from identification.models.prior_knowledge import PriorKnowledge
 from identification.pipeline.by_regression import (
     RegressionFit,
     by_regression,
     fit_regression,
 )
+from identification.pipeline.choice import select
 from identification.pipeline.evaluation import (
     evaluated,
     provenance_of,
     with_uncertainty,
 )
+from identification.pipeline.options import AUTO, MAP, Options, name_of, whole_call
 from identification.pipeline.pose import pose
-from identification.result import IdentificationResult
+from identification.pipeline.result import IdentificationResult
 from identification.samples.preprocess import smoothed_channels
 from identification.samples.problem import Problem, held_out
 from identification.samples.still_water import in_still_water
@@ -264,7 +264,39 @@ def fit_simulation(trials: Sequence[Trial], options: Options) -> SimulationFit:
     """The fit of `by_simulation`, before its predictions."""
     options = checked_mmg(options)
     problem = pose(trials, options)
-    return SimulationFit(problem, fit_mmg(problem, options))
+    asked = options.prior or PriorKnowledge()
+    if options.reference_model is not None:
+        asked = replace(asked, source=options.reference_model)
+    return SimulationFit(problem, fit_mmg(problem.blank, problem.used, asked))
+
+
+def checked_mmg(options: Options) -> Options:
+    """The options of an identification of the MMG form.
+
+    Raises InputError for those that it does not have.
+    """
+    if not (options.method_is_default or options.method == MAP):
+        raise InputError(
+            "method: expected none with structure 'mmg', got"
+            f" {name_of(options.method)!r}; it is not linear in its coefficients and is"
+            " fitted by simulation error with a prior: leave the method and its"
+            " settings out, or choose another structure"
+        )
+    covariance = options.uncertainty.covariance
+    if covariance == "bootstrap":
+        raise InputError(
+            "uncertainty: expected 'analytic' or 'posterior' with structure 'mmg', got"
+            f" {covariance!r}; leave it out, or choose another structure"
+        )
+    prior = None if options.prior is None else options.prior.source
+    if prior is not None and options.reference_model is not None:
+        raise InputError(
+            "reference_model: expected it without prior, got"
+            f" {name_of(options.reference_model)!r} and prior {name_of(prior)!r}; the"
+            " coefficients of structure 'mmg' are pulled to one reference ship, or to"
+            " formulas"
+        )
+    return replace(options, method=MAP)
 
 
 def _unguarded(

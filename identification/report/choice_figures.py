@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.estimators.search import BAND, LOG_C, SearchResult
-from identification.fit import Fit
+from identification.judging.fit import Fit
 from identification.judging.warnings import EQUATIONS
 from shipgym.arrays import Floats
 from shipgym.plots import PALETTE, Panel, axis, compact, line, panels, points

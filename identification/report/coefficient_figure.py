@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from identification.fit import Fit
+from identification.judging.fit import Fit
 from shipgym.manoeuvres.quantiles import NORMAL_95
 from shipgym.plots import Panel, axis, compact, panels, points
 from shipgym.plots.style import LIMIT, MODEL, Figure

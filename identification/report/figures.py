@@ -5,13 +5,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from identification.fit import Fit
-from identification.judging.covariance import residuals
+from identification.estimators.covariance import residuals
 from identification.judging.diagnostics import (
     autocorrelation,
     cross_correlation,
     without_overlap,
 )
+from identification.judging.fit import Fit
 from identification.judging.warnings import EQUATIONS
 from identification.report.choice_figures import (
     l_curve_figure,
@@ -37,8 +37,18 @@ from shipgym.plots.style import LIMIT, MEASURED, MODEL, MUTED, Figure
 UNITS = {"u": "m/s²", "v": "m/s²", "r": "deg/s²", "p": "deg/s²"}
 
 
-def all_figures(fit: Fit) -> dict[str, Figure]:
-    """Every figure of a fit by its name; see `IdentificationResult.plots`."""
+def plots(fit: Fit) -> dict[str, Figure]:
+    """Figures of an identification and of what its model predicts.
+
+    Raises InputError if plotly is not installed.
+
+    Returns
+    -------
+    dict of str to plotly.graph_objects.Figure
+        "fit", "residuals" (autocorrelation, and cross-correlation with the rudder),
+        "l-curve" for the method that has one, "coefficients", "trials", and
+        "prediction: NAME" for each trial held out.
+    """
     found = regression_figures(fit)
     found["coefficients"] = coefficients_figure(fit)
     fitted = [trial for trial in fit.trials if trial.use == "fit"]

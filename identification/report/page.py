@@ -1,13 +1,16 @@
 """The report of an identification: one self-contained HTML page."""
 
+import warnings
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
-from identification.fit import Fit
+from identification.judging.fit import Fit
 from identification.judging.warnings import why_unstable
 from identification.report.coefficient_figure import coefficients_figure
 from identification.report.figures import regression_figures
 from identification.report.view import fit_view, trial_figures
+from shipgym.files import write_text
 from shipgym.pages import NONE, render
 
 
@@ -31,6 +34,23 @@ def report_page(fit: Fit) -> str:
         settings=settings_rows(fit.settings),
         trials=fit.settings["trials"],
     )
+
+
+def write_report(fit: Fit, folder: str | Path) -> None:
+    """Write report.html, a page with the figures of a fit, into a folder.
+
+    Without plotly there is none, and a warning says so.
+    """
+    try:
+        import plotly  # noqa: F401
+    except ModuleNotFoundError:
+        remedy = "pip install 'shipgym[report]'"
+        warnings.warn(
+            f"plotly is not installed, so report.html was not written: {remedy}",
+            stacklevel=2,
+        )
+        return
+    write_text(report_page(fit), Path(folder) / "report.html")
 
 
 def settings_rows(settings: Mapping[str, Any]) -> dict[str, str]:

@@ -6,8 +6,19 @@ from typing import Any
 
 import numpy as np
 
+from identification.judging.fit import Fit
+from identification.judging.sentences import set_and_drift
 from shipgym import Trial
-from shipgym.plots import CHANNEL_AXES, MEASURED, MODEL, Panel, axis, line, panels
+from shipgym.plots import (
+    CHANNEL_AXES,
+    LIMIT,
+    MEASURED,
+    MODEL,
+    Panel,
+    axis,
+    line,
+    panels,
+)
 from shipgym.plots.style import Figure
 from shipgym.trials.navigation import rotate_to_body
 
@@ -157,3 +168,56 @@ def _path_line(
     if turning:
         return line(aside, ahead, name, colour, width)
     return line(ahead, aside, name, colour, width)
+
+
+def track_figure(fit: Fit) -> Figure | None:
+    """Tracks over ground and through the water, and how the current moved the water.
+
+    None where no current was removed.
+    """
+    provenance = fit.model.provenance or {}
+    currents = provenance.get("currents", {})
+    shown = list[Panel]()
+    for trial in fit.trials:
+        current = currents.get(trial.name)
+        if current is None or not current["taken_out"]:
+            continue
+        if {"x", "y"} <= trial.channels.keys():
+            panel = _track_panel(trial, current, number=len(shown))
+            shown.append(panel)
+    if not shown:
+        return None
+
+    return panels(
+        shown,
+        300 * rows_of_two(shown) + 80,
+        columns=2,
+        hovermode="closest",
+    )
+
+
+def _track_panel(trial: Trial, current: Mapping[str, Any], number: int) -> Panel:
+    """Both tracks, and from their end how far the water moved in the meantime."""
+    east, north = trial["y"], trial["x"]
+    raw = trial.raw
+    drift_east = current["east"] * trial.duration
+    drift_north = current["north"] * trial.duration
+    water_east = [east[-1], east[-1] + drift_east]
+    water_north = [north[-1], north[-1] + drift_north]
+    width = 1.7
+    tracks = [
+        line(raw["y"], raw["x"], "over ground", MEASURED, width),
+        line(east, north, "through the water", MODEL, width),
+        line(water_east, water_north, "the water meanwhile", LIMIT, width),
+    ]
+
+    own_x = f"x{number + 1}" if number else "x"
+    north_axis = axis("north, m", scaleanchor=own_x, scaleratio=1)
+    name = PurePath(trial.name).name
+    drift = set_and_drift(current["north"], current["east"])
+    return Panel(
+        tracks,
+        x="east, m",
+        y=north_axis,
+        title=f"{name}: {drift}",
+    )

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from identification.fit import Fit
-from identification.report.summary import PRIME, are_derivatives
+from identification.judging.fit import Fit
+from identification.pipeline.summary import PRIME, are_derivatives
 from shipgym import ShipModel, Trial
 from shipgym.pages import MINUS, NONE, fixed, number
 from shipgym.ships.particulars import ADDED_MASSES

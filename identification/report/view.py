@@ -7,9 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from identification.fit import Fit
 from identification.judging.diagnostics import EquationDiagnostics
-from identification.judging.rudder_bias import bias_sentences
+from identification.judging.fit import Fit
+from identification.judging.sentences import (
+    bias_sentences,
+    sea_sentences,
+    turn_sentences,
+)
 from identification.judging.warnings import (
     EQUATIONS,
     heading_errors_deg,
@@ -17,12 +21,15 @@ from identification.judging.warnings import (
     model_warnings,
     undetermined,
 )
-from identification.report.predictions import overview_figure, prediction_figure
-from identification.report.sea import sea_sentences, track_figure
-from identification.report.summary import (
+from identification.pipeline.summary import (
     are_derivatives,
     kernel_text,
     mixing_in_words,
+)
+from identification.report.predictions import (
+    overview_figure,
+    prediction_figure,
+    track_figure,
 )
 from identification.report.tables import (
     CoefficientRow,
@@ -38,7 +45,6 @@ from identification.report.tables import (
     steering_gear,
     trial_row,
 )
-from identification.report.turns import turn_sentences
 from shipgym.pages import NONE, fixed, number
 from shipgym.pages.numbers import counted
 from shipgym.plots.style import Figure

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification import RMSVM
-from identification.judging.guard import with_coefficients
+from identification.models.guard import with_coefficients
 from identification.models.methods import fit_all, get_method
 from identification.models.similarity import select_reference
 from identification.pipeline import identify
-from identification.result import IdentificationResult
+from identification.pipeline.result import IdentificationResult
 from identification.samples.folds import LARGEST_RUDDER, TRIALS
 from identification.samples.samples import build_samples
 from shipgym.errors import UnstableModelError

@@ -19,7 +19,7 @@ from identification.estimators.lssvm import LSSVM
 from identification.estimators.objectives import held_out_error, time_blocks
 from identification.estimators.tuned import TunedLSSVM
 from identification.pipeline import identify
-from identification.result import IdentificationResult
+from identification.pipeline.result import IdentificationResult
 from identification.samples.samples import Samples, build_samples
 from papers.row import Paper, Requirement, Row
 from shipgym.manoeuvres import zigzag

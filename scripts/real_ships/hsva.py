@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.judging.guard import reasons_unstable
+from identification.models.guard import reasons_unstable
 from identification.pipeline import identify
 from identification.samples.prediction import predict
 from real_ships.data import Data, MeasuredShip

@@ -14,12 +14,12 @@ import numpy as np
 
 from identification import PriorKnowledge, Refinement
 from identification.estimators.estimator import FitTask
-from identification.judging.guard import reasons_unstable, with_coefficients
+from identification.models.guard import reasons_unstable, with_coefficients
 from identification.models.methods import get_method
 from identification.models.prior import Prior, reference_prior
 from identification.models.pulled import Pulled
 from identification.pipeline import identify
-from identification.result import IdentificationResult
+from identification.pipeline.result import IdentificationResult
 from identification.samples.samples import build_samples
 from real_ships.data import MeasuredShip
 from real_ships.measures import zigzag_errors

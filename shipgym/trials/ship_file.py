@@ -46,7 +46,7 @@ class ShipFile:
         None where the file has no ``[steering]``.
     identify : dict
         Options of the identification as they stand in ``[identify]``, the table
-        ``[wind]`` among them; `identification.reading` checks them.
+        ``[wind]`` among them; `identification.pipeline.reading` checks them.
     entries : tuple of TrialEntry
         The trials, not read yet.
     structure : Structure or None

@@ -18,7 +18,7 @@ from agents.identifying import (
 )
 from identification.judging import selection
 from identification.models.methods import METHODS
-from identification.reading import ARGUMENTS, stage_settings
+from identification.pipeline.reading import ARGUMENTS, stage_settings
 from shipgym import InputError, ShipFile, list_structures, load_model
 
 #: The table of terms that the documentation shows.

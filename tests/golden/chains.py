@@ -14,7 +14,7 @@ import numpy as np
 
 import shipgym
 from identification import identify
-from identification.reading import full_name, identify_arguments
+from identification.pipeline.reading import full_name, identify_arguments
 from tests.golden.store import Floats, numbers_in
 
 ROOT = Path(__file__).parents[2]

@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from identification import identify
+from identification import identify, write_report
 from identification.judging.warnings import model_warnings, why_unstable
 from shipgym import InputError, ShipFile, ShipModel, Trial
 
@@ -228,7 +228,8 @@ def test_an_unstable_model_is_kept_and_marked_and_no_environment_takes_it(
     assert not result.stable
     assert "runs away" in (why_unstable(result) or "")
     assert "NOT STABLE" in result.summary()
-    result.save(tmp_path / "ship", report=True)
+    result.save(tmp_path / "ship")
+    write_report(result, tmp_path / "ship")
     page = (tmp_path / "ship" / "report.html").read_text(encoding="utf-8")
     assert "The identified model is unstable" in page
     kept = ShipModel.load(tmp_path / "ship" / "model.json")

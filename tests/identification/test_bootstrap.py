@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from identification import Samples, identify
+from identification.estimators.covariance import joint_covariance
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.judging.bootstrap import (
     bootstrap_covariance,
@@ -13,7 +14,6 @@ from identification.judging.bootstrap import (
     moving_blocks,
     rows_in,
 )
-from identification.judging.covariance import joint_covariance
 from identification.models.methods import fit_all, get_method
 from shipgym import InputError, ShipModel, Trial
 

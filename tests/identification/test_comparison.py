@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from html import unescape
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from identification import Comparison, compare_methods, cross_validate
-from identification.judging.comparison import COMPARISON_FILES, fit_pairs
-from identification.report.comparison import comparison_page, headings_figure
+from identification.pipeline.comparison import COMPARISON_FILES
 from identification.samples.folds import held_out_rows
 from identification.samples.samples import build_samples
 from shipgym import InputError, ShipModel, Trial
@@ -26,7 +23,6 @@ def comparison(noisy_trials: list[Trial], mariner: ShipModel) -> Comparison:
     options = {
         "particulars": mariner.particulars,
         "steering": mariner.steering,
-        "settings": {"C": 1e4, "rank": 8},
     }
     return compare_methods(noisy_trials, methods, **options)
 
@@ -55,18 +51,11 @@ def test_a_method_that_does_not_fit_the_structure_is_told(
     assert "expected structure 'grey-box'" in comparison.refused["rm-svm"]
 
 
-def test_settings_go_to_the_methods_that_know_them(comparison: Comparison) -> None:
-    assert comparison.left_out["ls"] == ("C", "rank")
-    assert comparison.left_out["ls-svm"] == ("rank",)
-    assert "tls-svm" not in comparison.left_out
-    assert comparison.results["tls-svm"].diagnostics["v"].rank == 8
-
-
 def test_it_is_written_with_every_model(comparison: Comparison, tmp_path: Path) -> None:
     comparison.save(tmp_path)
     names = {path.name for path in tmp_path.iterdir()}
     models = {f"model-{name}.json" for name in comparison.results}
-    assert names == {"comparison.json", "comparison.html"} | models
+    assert names == {"comparison.json"} | models
     assert names <= set(COMPARISON_FILES)
     told = json.loads((tmp_path / "comparison.json").read_text())
     assert [row["method"] for row in told["ranking"]] == [
@@ -80,37 +69,6 @@ def test_it_is_written_with_every_model(comparison: Comparison, tmp_path: Path) 
     alone = replace(comparison, ranked=comparison.ranked[:1], results={first: result})
     alone.save(tmp_path / "alone")
     assert (tmp_path / "alone" / f"model-{first}.json").exists()
-
-
-def test_the_page_shows_the_ranking_and_why_methods_are_missing(
-    comparison: Comparison,
-) -> None:
-    page = comparison_page(comparison)
-    first = comparison.ranked[0]
-    assert f"{first.structure} by {first.method} predicts best: error" in page
-    for place, fit in enumerate(comparison.ranked, start=1):
-        assert f"<td>{place}</td><td>{fit.method}</td>" in page
-        assert fit.error is None or f"<td>{fit.error:.4f}</td>" in page
-    for name, reason in comparison.refused.items():
-        assert f"{name}: {reason}" in unescape(page)
-    for figure in ("errors", "headings"):
-        assert f'id="{figure}"' in page
-
-
-def test_no_name_or_message_becomes_html(comparison: Comparison) -> None:
-    hostile = "<script>alert(1)</script>\"'&{{ 7 * 7 }}"
-    first = replace(comparison.ranked[0], errors={hostile: 0.1}, method=hostile)
-    results = {hostile: comparison.best}
-    changed = replace(
-        comparison, ranked=(first,), results=results, refused={hostile: hostile}
-    )
-    page = comparison_page(changed)
-    assert "<script>alert" not in page
-    assert (
-        page.count("&lt;script&gt;alert(1)&lt;/script&gt;&#34;&#39;&amp;{{ 7 * 7 }}")
-        == 4
-    )
-    assert page.count("</script>") == 4  # plotly.js, two figures, printing
 
 
 def test_without_trials_to_validate_each_is_held_out_in_turn(
@@ -141,36 +99,6 @@ def test_two_trials_are_enough_to_hold_each_out(
         cross_validate(noisy_trials[:1], **options)
 
 
-def test_the_four_best_are_drawn_with_the_error_of_their_headings() -> None:
-    """Running means over two of 210 samples; three panels in two rows."""
-    t = np.arange(210.0)
-    held = [
-        Trial(t, {"psi": 0.1 * t}, name=f"runs/{k}.csv", use="validate")
-        for k in range(3)
-    ]
-    others = [Trial(t, {"psi": t}, use="fit"), Trial(t, {"r": t}, use="validate")]
-    results = {
-        f"method {k}": SimpleNamespace(
-            trials=[*others, *held],
-            predictions={
-                one.name: {"psi": 0.1 * t + np.radians(0.01 * k * t)} for one in held
-            },
-        )
-        for k in range(6)
-    }
-    results["method 1"].predictions["runs/2.csv"] = None
-    figure = headings_figure(SimpleNamespace(results=results, best=results["method 0"]))  # type: ignore[arg-type]
-    assert figure.layout.height == 540
-    drawn = {
-        axis: [one for one in figure.data if one.xaxis == axis]
-        for axis in ("x", "x2", "x3")
-    }
-    assert [len(lines) for lines in drawn.values()] == [4, 4, 3]
-    assert [line.name for line in drawn["x"]] == [f"method {k}" for k in range(4)]
-    np.testing.assert_allclose(drawn["x"][2].x, t[1:] - 0.5)
-    np.testing.assert_allclose(drawn["x"][2].y, 0.02 * (t[1:] - 0.5), rtol=1e-4)
-
-
 def test_what_cannot_be_compared_is_named(
     noisy_trials: list[Trial], mariner: ShipModel
 ) -> None:
@@ -179,23 +107,10 @@ def test_what_cannot_be_compared_is_named(
         compare_methods(noisy_trials, ["ls", "lsq"], **options)
     with pytest.raises(InputError, match="methods: expected at least one"):
         compare_methods(noisy_trials, [], **options)
-    with pytest.raises(InputError, match="got 1 to fit and none to validate"):
+    with pytest.raises(InputError, match="expected at least 2 to fit"):
         compare_methods(noisy_trials[:1], ["ls"], **options)
-    with pytest.raises(InputError, match=r"folds: .*one of the methods ls"):
-        compare_methods(noisy_trials, ["ls"], settings={"folds": 3}, **options)
     with pytest.raises(InputError, match="expected structure 'grey-box'"):
         compare_methods(noisy_trials, ["rm-svm"], **options)
-
-
-def test_the_mmg_form_is_fitted_once_by_the_first_of_the_methods() -> None:
-    """With other structures each is fitted by all of them; alone as asked."""
-    asked = ["ls", "tls-svm"]
-    assert fit_pairs(["abkowitz", "mmg"], asked, True) == [
-        ("abkowitz", "ls"),
-        ("abkowitz", "tls-svm"),
-        ("mmg", "ls"),
-    ]
-    assert fit_pairs(["mmg"], asked, False) == [("mmg", "ls"), ("mmg", "tls-svm")]
 
 
 def test_a_single_trial_is_held_out_in_pieces_that_cover_it(

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification import Options
 from identification.judging.extrapolation import (
     beyond_trials,
     extrapolation_error,
@@ -13,10 +12,8 @@ from identification.judging.extrapolation import (
     holds_turn,
     largest_rudders,
 )
-from identification.judging.ranking import RankedFit
-from identification.judging.selection import shown_to_turn
-from identification.models.prior_knowledge import PriorKnowledge
-from identification.report.turns import turn_sentences
+from identification.judging.selection import RankedFit, shown_to_turn
+from identification.judging.sentences import turn_sentences
 from shipgym import ShipModel, Trial, load_model
 from shipgym.manoeuvres import turning_circle, zigzag
 
@@ -102,10 +99,9 @@ def test_few_parameters_and_priors_are_known_to_turn() -> None:
 
     table, few, mmg = fit("cubic"), fit("norrbin"), fit("mmg")
     ranked = [table, few, mmg, fit("grey-box", ran_away=1)]
-    assert shown_to_turn(ranked, Options()) == [few, mmg]
-    assert shown_to_turn([table], Options()) == [table]
-    pulled = Options(prior=PriorKnowledge("mariner"))
-    assert shown_to_turn(ranked, pulled) == [table, few, mmg]
+    assert shown_to_turn(ranked) == [few, mmg]
+    assert shown_to_turn([table]) == [table]
+    assert shown_to_turn(ranked, ["cubic"]) == [table, few, mmg]
 
 
 def test_the_page_says_what_holds_the_turn_and_by_how_much() -> None:

@@ -11,14 +11,14 @@ import pytest
 import shipgym
 from identification import IdentificationResult, Samples, identify
 from identification.estimators.estimator import FitTask
-from identification.judging.guard import (
+from identification.models.guard import (
     Simulation,
     guarded_fit,
     reasons_unstable,
     reversed_rudder,
     why_unphysical,
 )
-from identification.judging.hard_turn import hard_turn_features
+from identification.models.hard_turn import hard_turn_features
 from identification.models.methods import fit_held, get_method
 from shipgym import ShipModel, Trial
 from shipgym.manoeuvres import zigzag

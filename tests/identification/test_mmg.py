@@ -19,16 +19,14 @@ from identification import (
     PriorKnowledge,
     TruncatedLSSVM,
     identify,
+    write_report,
 )
 from identification.judging.warnings import model_warnings
 from identification.models.hull_formulas import (
     HULL_FORMULAS,
     formula_coefficients,
 )
-from identification.models.maximum_a_posteriori import (
-    checked_mmg,
-    strongest_as_good,
-)
+from identification.models.maximum_a_posteriori import strongest_as_good
 from identification.models.mmg_prior import mmg_prior, reference_coefficients
 from identification.models.posterior import (
     LARGEST,
@@ -36,7 +34,8 @@ from identification.models.posterior import (
     Posterior,
     held_out_groups,
 )
-from identification.options import Options
+from identification.pipeline.options import Options
+from identification.pipeline.routes import checked_mmg
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.engine.motion import Motion, Ship
 from shipgym.manoeuvres import turning_circle, turning_indices
@@ -432,7 +431,8 @@ def test_its_result_is_saved_and_loaded_like_any_other(
 ) -> None:
     _, found = fitted
     assert "mmg by map" in found.summary()
-    found.save(tmp_path, report=True)
+    found.save(tmp_path)
+    write_report(found, tmp_path)
     again = shipgym.load_model(tmp_path / "model.json")
     state, command = [0, 0, 0, 1.0, -0.1, 0.05, 0.2], [0.2, 11.0]
     np.testing.assert_array_equal(

@@ -9,6 +9,7 @@ import pytest
 from certainty import case
 
 from identification import IdentificationResult, Samples, Uncertainty, identify
+from identification.estimators.covariance import without_trial
 from identification.estimators.rm_svm import RMSVM
 from identification.judging.closed_loop import closed_loop, legs
 from identification.judging.model_error import (
@@ -19,7 +20,6 @@ from identification.judging.model_error import (
     model_error,
     motion_errors,
     scale_of,
-    without_trial,
 )
 from identification.judging.warnings import held_out_error
 from identification.models.grey_box import chosen_box

@@ -19,8 +19,9 @@ from identification import (
     TunedLSSVM,
     Uncertainty,
     identify,
+    write_report,
 )
-from identification.options import changed_settings, name_of, plain
+from identification.pipeline.options import changed_settings, name_of, plain
 from identification.pipeline.pose import pose
 from shipgym import InputError, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
@@ -228,7 +229,8 @@ def test_summary_is_a_table_with_errors_and_marks_estimates(
 def test_result_is_saved_whole_and_read_back(
     noisy_fit: IdentificationResult, tmp_path: Path
 ) -> None:
-    noisy_fit.save(tmp_path / "ship", report=True)
+    noisy_fit.save(tmp_path / "ship")
+    write_report(noisy_fit, tmp_path / "ship")
     names = ["metrics.json", "model.json", "report.html", "settings.json"]
     assert sorted(path.name for path in (tmp_path / "ship").iterdir()) == names
     loaded = ShipModel.load(tmp_path / "ship" / "model.json")
@@ -246,8 +248,9 @@ def test_without_plotly_an_earlier_report_does_not_stay(
     (tmp_path / "report.html").write_text("of another model")
     monkeypatch.setitem(sys.modules, "plotly", None)
     told = r"plotly is not installed, so report.html .*'shipgym\[report\]'"
+    noisy_fit.save(tmp_path)
     with pytest.warns(UserWarning, match=told) as warned:
-        noisy_fit.save(tmp_path, report=True)
+        write_report(noisy_fit, tmp_path)
     assert warned[0].filename == __file__  # where it was asked for
     assert {path.name for path in tmp_path.iterdir()} == {
         "metrics.json",

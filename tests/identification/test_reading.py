@@ -18,7 +18,7 @@ from identification import (
     Uncertainty,
 )
 from identification.models.methods import METHODS, method_options
-from identification.reading import (
+from identification.pipeline.reading import (
     ARGUMENTS,
     STAGES,
     full_name,

@@ -10,7 +10,7 @@ import pytest
 
 from identification import IdentificationResult, Refinement, build_samples, identify
 from identification.estimators.estimator import FitTask
-from identification.judging.guard import guarded_fit
+from identification.models.guard import guarded_fit
 from identification.models.methods import get_method
 from identification.models.output_error import OutputError, in_bins
 from identification.models.refine import refine, term_sizes

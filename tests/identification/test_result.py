@@ -22,10 +22,14 @@ from identification import (
     Samples,
     TruncatedLSSVM,
     identify,
+    plots,
+    write_report,
 )
 from identification.estimators.search import BAND, LOG_C, SearchResult
 from identification.judging.diagnostics import cross_correlation
 from identification.judging.warnings import held_out_error
+from identification.pipeline.result import FILES
+from identification.pipeline.summary import coefficients_table
 from identification.report.choice_figures import l_curve_figure, search_figure
 from identification.report.choice_figures import truncated as with_a_rank
 from identification.report.coefficient_figure import coefficients_figure
@@ -36,7 +40,6 @@ from identification.report.figures import (
 )
 from identification.report.page import report_page, settings_rows
 from identification.report.predictions import overview_figure, prediction_figure
-from identification.report.summary import coefficients_table
 from identification.report.tables import (
     coefficient_tables,
     index_lines,
@@ -45,7 +48,6 @@ from identification.report.tables import (
     trial_row,
 )
 from identification.report.view import fit_view, quality_card
-from identification.result import FILES
 from shipgym import ShipFile, ShipModel, Trial
 from shipgym.pages import NONE, environment, fixed
 from shipgym.ships.particulars import ADDED_MASSES
@@ -53,14 +55,16 @@ from shipgym.ships.particulars import ADDED_MASSES
 ROOT = Path(__file__).parents[2]
 SAVE = """
 import sys
-from identification import identify
+from identification import identify, write_report
 from shipgym import ShipFile
 ship = ShipFile.load("examples/mariner/ship.toml")
-identify(
+result = identify(
     ship.trials(), method="abc-lssvr",
     particulars=ship.particulars, steering=ship.steering,
     hold_out=["zigzag_10_10.csv"], uncertainty="bootstrap",
-).save(sys.argv[1], report=True)
+)
+result.save(sys.argv[1])
+write_report(result, sys.argv[1])
 """
 
 
@@ -95,7 +99,8 @@ def test_the_same_call_on_the_same_data_writes_the_same_bytes(tmp_path: Path) ->
     result = identify(
         ship.trials(), particulars=ship.particulars, steering=ship.steering, **settings
     )
-    result.save(tmp_path / "here", report=True)
+    result.save(tmp_path / "here")
+    write_report(result, tmp_path / "here")
     for name in FILES:
         assert (tmp_path / "here" / name).read_bytes() == (
             tmp_path / "there" / name
@@ -126,12 +131,12 @@ def test_figures_by_name(
 ) -> None:
     held = f"prediction: {truncated.trials[-1].name}"
     common = {"fit", "residuals", "coefficients", "trials", held}
-    assert truncated.plots().keys() == common | {"l-curve"}
-    assert searched.plots().keys() == common | {"search"}
+    assert plots(truncated).keys() == common | {"l-curve"}
+    assert plots(searched).keys() == common | {"search"}
 
 
 def test_the_fit_is_drawn_from_the_regression(truncated: IdentificationResult) -> None:
-    traces = truncated.plots()["fit"].data
+    traces = plots(truncated)["fit"].data
     seen = np.asarray(traces[0].y, dtype=float)
     seen = seen[np.isfinite(seen)]
     samples = truncated.samples
@@ -143,7 +148,7 @@ def test_the_fit_is_drawn_from_the_regression(truncated: IdentificationResult) -
 def test_residuals_come_with_bounds_of_white_noise(
     truncated: IdentificationResult,
 ) -> None:
-    traces = truncated.plots()["residuals"].data
+    traces = plots(truncated)["residuals"].data
     bars, bound = traces[0], max(traces[2].y)
     autocorrelation = truncated.diagnostics["u"].residual_autocorrelation
     np.testing.assert_allclose(
@@ -159,7 +164,7 @@ def test_residuals_come_with_bounds_of_white_noise(
 def test_the_rank_chosen_is_marked_on_the_l_curve(
     truncated: IdentificationResult,
 ) -> None:
-    figure = truncated.plots()["l-curve"]
+    figure = plots(truncated)["l-curve"]
     curve = truncated.estimators["u"].l_curve_  # type: ignore[attr-defined]
     marked = next(trace for trace in figure.data if trace.name == "chosen")
     rank = truncated.diagnostics["u"].rank
@@ -170,7 +175,7 @@ def test_the_rank_chosen_is_marked_on_the_l_curve(
 def test_the_search_is_drawn_to_the_c_that_it_found(
     searched: IdentificationResult,
 ) -> None:
-    traces = searched.plots()["search"].data
+    traces = plots(searched)["search"].data
     assert traces[0].y[-1] == pytest.approx(1.0)
     assert np.all(np.diff(traces[0].y) <= 0.0)
     best = next(trace for trace in traces if trace.xaxis == "x2")
@@ -191,16 +196,17 @@ def test_a_grey_box_tells_of_its_search_where_it_searched(
         "reference_model": "tanker",
     }
     result = identify(noisy_trials, method=RMSVM(epsilon=epsilon), **options)
-    assert result.plots().keys() & {"search", "l-curve"} == figures
+    assert plots(result).keys() & {"search", "l-curve"} == figures
     if epsilon is None:
-        panels = [trace.xaxis for trace in result.plots()["search"].data]
+        panels = [trace.xaxis for trace in plots(result)["search"].data]
         assert sorted(panels) == [
             "x",
             "x2",
             "x2",
             "x2",
         ]  # one search, a band for each equation
-    result.save(tmp_path, report=True)
+    result.save(tmp_path)
+    write_report(result, tmp_path)
     assert "Mariner" in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "beside the bare reference ship 'tanker" in " ".join(
         result.summary().split()
@@ -220,7 +226,7 @@ def test_a_channel_that_never_moves_is_no_trouble(
 
 def test_intervals_of_coefficients_are_theirs(truncated: IdentificationResult) -> None:
     """In per cent of the estimate, 1.96 standard errors to either side."""
-    trace = truncated.plots()["coefficients"].data[0]
+    trace = plots(truncated)["coefficients"].data[0]
     drawn = dict(
         zip(
             (text.split(":")[0] for text in trace.text),

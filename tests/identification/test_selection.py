@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from identification import LSSVM, IdentificationResult, Options, identify
-from identification.judging.ranking import RankedFit
-from identification.judging.selection import select, simplest
+from identification.judging.selection import RankedFit, simplest
+from identification.pipeline.choice import select
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.models.linear import straight_running

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from identification import Uncertainty, identify
-from identification.report.sea import current_text, sea_sentences, track_figure
+from identification.judging.sentences import current_text, sea_sentences
+from identification.report.predictions import track_figure
 from identification.samples.current import estimate_current
 from identification.samples.still_water import in_still_water
 from identification.samples.surge_sway import (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification import Samples, build_samples
-from identification.judging.covariance import (
+from identification.estimators.covariance import (
     coefficient_covariance,
     effective_freedom,
     joint_covariance,

@@ -6,15 +6,17 @@ from typing import Any
 
 from rich.table import Table
 
-from identification.fit import Fit
-from identification.judging.rudder_bias import bias_sentences
+from identification.judging.fit import Fit
+from identification.judging.sentences import (
+    bias_sentences,
+    sea_sentences,
+    turn_sentences,
+)
 from identification.judging.warnings import (
     EQUATIONS,
     exactly_collinear,
     undetermined,
 )
-from identification.report.sea import sea_sentences
-from identification.report.turns import turn_sentences
 from identification.text import as_text, lined_table
 from shipgym import ShipModel
 from shipgym.ships.particulars import ADDED_MASSES

@@ -17,7 +17,7 @@ from identification.judging.uncertainty import Uncertainty
 from identification.models.methods import METHODS, make_method, method_options
 from identification.models.prior_knowledge import PriorKnowledge
 from identification.models.refinement import Refinement
-from identification.options import DEFAULT_METHOD, MAP, Options
+from identification.pipeline.options import DEFAULT_METHOD, MAP, Options
 from identification.samples.preprocess import Preprocessing
 from identification.samples.samples import Sampling
 from shipgym import InputError

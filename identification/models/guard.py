@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from identification.estimators.estimator import Estimators, FitTask
-from identification.judging.hard_turn import RUDDER_DEG, hard_turn_features
+from identification.models.hard_turn import RUDDER_DEG, hard_turn_features
 from identification.models.methods import Method, fit_held
 from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.manoeuvres import turning_circle

@@ -1,4 +1,4 @@
-"""Current and wind that were removed from trials: sentences, and tracks."""
+"""What holds a hard turn, the bias of the rudder, current and wind, in words."""
 
 from collections import defaultdict
 from collections.abc import Mapping
@@ -7,14 +7,53 @@ from typing import Any
 
 import numpy as np
 
-from identification.fit import Fit
-from identification.report.predictions import rows_of_two
 from identification.samples.velocities import SIGNIFICANT
-from shipgym import Trial
 from shipgym.manoeuvres.quantiles import NORMAL_95
-from shipgym.plots import LIMIT, MEASURED, MODEL, Panel, axis, line, panels
-from shipgym.plots.style import Figure
 from shipgym.trials.units import KNOT
+
+
+def turn_sentences(provenance: Mapping[str, Any]) -> list[str]:
+    """What holds a hard turn of a model, by its provenance, and within how much."""
+    sentences = []
+    error = provenance.get("model_error", {}).get("hard_turn")
+    if error:
+        percent = 100.0 * error["size"]
+        sentences.append(
+            "No trial turns through half a circle: the angle of a hard turn is taken"
+            f" to be known to {percent:.0f} % (standard error; {error['how']}). A turn"
+            " at full rudder would show it."
+        )
+    choice = provenance.get("selection", {}).get("turns", {})
+    passed_over = choice.get("predicts_better")
+    if passed_over:
+        sentences.append(
+            f"The structure was taken for {choice['shown_by']}, known to turn:"
+            f" {passed_over} predicts the trials held out better, but nothing shows"
+            " that it turns."
+        )
+    return sentences
+
+
+def bias_sentences(bias: dict[str, Any] | None) -> list[str]:
+    """The bias in words; none where there is none."""
+    if bias is None:
+        return []
+    angle, error = bias["angle_deg"], bias["standard_error_deg"]
+    side = "starboard" if angle > 0.0 else "port"
+    margin = 1.96 * error
+    found = (
+        f"Rudder bias: the ship runs straight with {abs(angle):.2g} ± {margin:.2g} deg"
+        f" (95 %) to {side}"
+    )
+    if not bias["significant"]:
+        return [f"{found}, which does not differ from zero."]
+    if bias["in_model"]:
+        return [f"{found}; the model has it."]
+    structure = bias["structure"]
+    return [
+        f"{found}, by {structure}; the structure has no constant for it: it belongs to"
+        f" the rudder's zero, or take structure {structure!r}."
+    ]
 
 
 def sea_sentences(provenance: Mapping[str, Any]) -> list[str]:
@@ -74,9 +113,9 @@ def current_text(row: Mapping[str, Any]) -> str:
         "given": "as given",
         "columns": "from columns",
     }
-    set_and_drift = _set_and_drift(row["north"], row["east"])
+    found = set_and_drift(row["north"], row["east"])
     source = row["source"]
-    parts = [f"current of {set_and_drift}", sources[source]]
+    parts = [f"current of {found}", sources[source]]
     if "standard_errors" in row:
         parts += _current_interval(row)
     elif source in ("trial", "all trials"):
@@ -102,62 +141,10 @@ def _current_interval(row: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _set_and_drift(north: float, east: float) -> str:
+def set_and_drift(north: float, east: float) -> str:
+    """Speed of a current, m/s and knots, and where it sets."""
     speed = np.hypot(north, east)
     knots = speed / KNOT
     bearing = np.arctan2(east, north)
     towards = np.degrees(bearing) % 360.0
     return f"{speed:.2f} m/s ({knots:.2f} knots) towards {towards:03.0f} deg"
-
-
-def track_figure(fit: Fit) -> Figure | None:
-    """Tracks over ground and through the water, and how the current moved the water.
-
-    None where no current was removed.
-    """
-    provenance = fit.model.provenance or {}
-    currents = provenance.get("currents", {})
-    shown = list[Panel]()
-    for trial in fit.trials:
-        current = currents.get(trial.name)
-        if current is None or not current["taken_out"]:
-            continue
-        if {"x", "y"} <= trial.channels.keys():
-            panel = _track_panel(trial, current, number=len(shown))
-            shown.append(panel)
-    if not shown:
-        return None
-
-    return panels(
-        shown,
-        300 * rows_of_two(shown) + 80,
-        columns=2,
-        hovermode="closest",
-    )
-
-
-def _track_panel(trial: Trial, current: Mapping[str, Any], number: int) -> Panel:
-    """Both tracks, and from their end how far the water moved in the meantime."""
-    east, north = trial["y"], trial["x"]
-    raw = trial.raw
-    drift_east = current["east"] * trial.duration
-    drift_north = current["north"] * trial.duration
-    water_east = [east[-1], east[-1] + drift_east]
-    water_north = [north[-1], north[-1] + drift_north]
-    width = 1.7
-    tracks = [
-        line(raw["y"], raw["x"], "over ground", MEASURED, width),
-        line(east, north, "through the water", MODEL, width),
-        line(water_east, water_north, "the water meanwhile", LIMIT, width),
-    ]
-
-    own_x = f"x{number + 1}" if number else "x"
-    north_axis = axis("north, m", scaleanchor=own_x, scaleratio=1)
-    name = PurePath(trial.name).name
-    set_and_drift = _set_and_drift(current["north"], current["east"])
-    return Panel(
-        tracks,
-        x="east, m",
-        y=north_axis,
-        title=f"{name}: {set_and_drift}",
-    )

@@ -1,11 +1,14 @@
 """Covariance of the coefficients of all equations of motion together."""
 
+import copy
+from collections.abc import Sequence
+
 import numpy as np
 
 from identification.estimators.estimator import Estimator, Estimators, weights
 from identification.estimators.threads import single_threaded
 from identification.samples.samples import Samples
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.trials.resampling import usual_step
 
 
@@ -136,3 +139,63 @@ def newey_west(scores: Floats, lags: int) -> Floats:
         weight = 1.0 - lag / (most + 1.0)
         total += weight * (moment + moment.T)
     return total
+
+
+def without_trial(
+    estimators: Estimators,
+    samples: Samples,
+    trial: int,
+) -> tuple[Estimators, Samples]:
+    """Estimators as if fitted without a trial, and the rows of the others."""
+    return without_trials(estimators, samples, [trial])
+
+
+def without_trials(
+    estimators: Estimators,
+    samples: Samples,
+    trials: Sequence[int],
+) -> tuple[Estimators, Samples]:
+    """Estimators as if fitted without some trials, and the rows of the others.
+
+    Exact for linear estimators that keep their directions and penalty: the normal
+    equations less the rows left out.
+    """
+    errors = residuals(estimators, samples)
+    out = np.isin(samples.trial, trials)
+    found = {}
+    for q, estimator in estimators.items():
+        found[q] = _without_rows(
+            estimator,
+            features=samples.features[q],
+            errors=errors[q],
+            out=out,
+        )
+    return found, samples.select(~out)
+
+
+def _without_rows(
+    estimator: Estimator,
+    features: Floats,
+    errors: Floats,
+    out: Flags,
+) -> Estimator:
+    """An estimator less the rows of its normal equations that are `out`.
+
+    With M the inverse moment of all, that of the others is (1 - M X'W X)^-1 M, with the
+    features X and weights W of the rows left out.
+    """
+    counts = weights(estimator, features)
+    M = estimator.inverse_moment_
+    X = features[out]
+    XW = X.T * counts[out]
+    change = np.linalg.pinv(np.eye(len(M)) - M @ XW @ X)
+
+    inverse = change @ M
+    moved = XW @ errors[out]
+
+    found = copy.copy(estimator)
+    found.coef_ = estimator.coef_ - inverse @ moved
+    found.inverse_moment_ = inverse
+    if hasattr(estimator, "weights_"):
+        found.weights_ = counts[~out]  # type: ignore[attr-defined]
+    return found

@@ -1,0 +1,59 @@
+"""What `identify` returns: a fit with its summary and files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from identification.judging.fit import Fit
+from identification.pipeline.summary import summary_table
+from shipgym import InputError
+from shipgym.drafts import draft_folder
+from shipgym.files import write_json
+
+#: Files of a saved result; the last one is that of `write_report`.
+FILES = ("model.json", "metrics.json", "settings.json", "report.html")
+
+
+class IdentificationResult(Fit):
+    """An identified model and how it came about; `Fit` lists its attributes."""
+
+    def summary(self) -> str:
+        """Table of all coefficients and of the inertia they are based on.
+
+        Name, value and standard error (of forces in the prime system 1e-5) and t;
+        inertia that was not given is marked as estimated.
+        """
+        return summary_table(self)
+
+    def save(self, folder: str | Path) -> None:
+        """Write model.json, metrics.json and settings.json, all or none.
+
+        The same call on the same data gives the same files, byte for byte.
+
+        Raises InputError where it cannot be written.
+
+        Parameters
+        ----------
+        folder : str or Path
+            Created where it does not exist; an earlier report.html in it goes.
+        """
+        folder = Path(folder)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with draft_folder(folder / "identification") as draft:
+                self._write(draft)
+                for name in FILES:
+                    if (draft / name).exists():
+                        (draft / name).replace(folder / name)
+                    else:  # an earlier one would describe another model
+                        (folder / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"{folder}: expected a folder that can be written, got"
+                f" {error.strerror!r}; choose another folder"
+            ) from error
+
+    def _write(self, folder: Path) -> None:
+        self.model.save(folder / "model.json")
+        write_json(self.metrics, folder / "metrics.json")
+        write_json(self.settings, folder / "settings.json")
