@@ -340,22 +340,6 @@ def test_a_clock_that_is_set_back_is_named(tmp_path):
         read(tmp_path, lines[:450] + lines[300:])
 
 
-def test_weeks_of_satellites_that_began_again_are_named(tmp_path):
-    old = BEGIN - 1024 * 7 * 86400.0
-    lines = plain(lambda one: rmc(one, begin=old), hdt, rsa)
-    trial = read(tmp_path, lines)
-    check(trial)
-    said(trial, "if it should be 2021-05-03, the receiver is 1024 weeks back")
-
-    lines = stamped(STAMPS["dated"], lambda one: rmc(one, begin=old), hdt, rsa)
-    trial = read(tmp_path, lines)
-    check(trial)
-    said(trial, "is 1024 weeks back (2001-09-17)")
-
-
-# --- Signal K
-
-
 def delta(one, values, context="vessels.self", of="$source"):
     source = "gyro" if of == "$source" else {"label": "n2k", "src": "3", "pgn": 127250}
     update = {

@@ -1,7 +1,6 @@
 """The clock of a log of messages: what satellites say, and stamps before the lines."""
 
 from collections import Counter, defaultdict
-from datetime import UTC, datetime
 from operator import itemgetter
 from pathlib import Path
 from typing import NamedTuple
@@ -15,8 +14,6 @@ from shipgym.trials.clock_texts import DAY, clock_text
 from shipgym.trials.readers.line_stamps import read_stamps
 from shipgym.trials.readers.messages import BySource, Heard, Value
 
-_ROLLOVER = 1024 * 7 * DAY  # the week of GPS has ten bits
-
 
 class Clock(NamedTuple):
     """Times, s, that only increase, and the lines from which on they hold."""
@@ -24,7 +21,6 @@ class Clock(NamedTuple):
     t: Floats
     lines: Floats
     source: str  # of the times, for a note
-    later: float = 0.0  # s to add to the times that messages give
     in_bursts: bool = False  # messages of one moment follow each other
     leads: bool = False  # what is heard before the first moment is of that one
 
@@ -35,30 +31,37 @@ def log_clock(path: Path, heard: Heard, notes: list[str]) -> Clock | None:
     Stamps of lines are preferred, as they are there for every message; by the times of
     satellites they are put right. Raises InputError for a clock that was set back.
     """
-    clock = _agreed_clock(path, heard, notes)
+    own = _own_clock(path, heard.times)
+    stamps = _stamp_clock(heard)
+    clock = stamps or own
+    if own is not None and stamps is not None:
+        clock = _agreed(stamps, own, heard.times[own.source], notes)
     if clock is None:
         return None
     heard.order.sort(key=itemgetter(0))
     return _with_bursts(clock, heard.order)
 
 
-def _agreed_clock(path: Path, heard: Heard, notes: list[str]) -> Clock | None:
-    own = _own_clock(path, heard.times)
-    stamps = _stamp_clock(heard)
-    if stamps is None:
-        return _noted(own, notes)
-    if own is None:
-        return stamps
-
-    values = heard.times[own.source]
+def _agreed(stamps: Clock, own: Clock, values: list[Value], notes: list[str]) -> Clock:
+    """Stamps put right by the times of satellites; these where both do not agree."""
     ahead = _ahead(stamps, values)
-    least, most = np.quantile(ahead, [0.1, 0.9])
+    least, middle, most = np.quantile(ahead, [0.1, 0.5, 0.9])
     if most - least > 2.0:
         notes.append(
             f"times before the lines do not run with those of {own.source}: left out"
         )
-        return _noted(own, notes)
-    return _agreed(stamps, float(np.median(ahead)), own, notes)
+        return own
+    if abs(middle) <= 1.0:  # a message takes part of a second
+        return stamps
+    if is_dated(stamps.t[0]):
+        size = f"{middle:.6g} s"
+        if abs(middle) > DAY:
+            size = f"{middle / DAY:.3g} days"
+        notes.append(
+            f"the times before the lines are {size} ahead of those of {own.source},"
+            " which are taken"
+        )
+    return stamps._replace(t=stamps.t - middle)
 
 
 def _own_clock(path: Path, times: BySource) -> Clock | None:
@@ -131,50 +134,6 @@ def _ahead(stamps: Clock, values: list[Value]) -> Floats:
     return of_day - DAY * days
 
 
-def _agreed(stamps: Clock, ahead: float, own: Clock, notes: list[str]) -> Clock:
-    """Stamps put right by the clock of satellites, unless its weeks are too few."""
-    rollovers = round(ahead / _ROLLOVER)
-    rest = ahead - rollovers * _ROLLOVER
-    if is_dated(own.t[0]) and rollovers >= 1 and abs(rest) < DAY:
-        notes.append(
-            f"the date of {own.source} is {1024 * rollovers} weeks back"
-            f" ({_day(own.t[0])}), a rollover of the weeks of GPS: that before the"
-            f" lines is taken ({_day(stamps.t[0])})"
-        )
-        return stamps._replace(later=ahead)
-
-    if abs(ahead) <= 1.0:  # a message takes part of a second
-        return stamps
-    if is_dated(stamps.t[0]):
-        size = f"{ahead / DAY:.3g} days" if abs(ahead) > DAY else f"{ahead:.6g} s"
-        notes.append(
-            f"the times before the lines are {size} ahead of those of {own.source},"
-            " which are taken"
-        )
-    return stamps._replace(t=stamps.t - ahead)
-
-
-def _noted(own: Clock | None, notes: list[str]) -> Clock | None:
-    """The clock of satellites; a note where its date may be weeks back."""
-    if own is None or not is_dated(own.t[0]):
-        return own
-    begin = float(own.t[0])
-    later = begin + _ROLLOVER
-    earliest = datetime(1980, 1, 1, tzinfo=UTC)
-    now = datetime.now(UTC)
-    if begin >= earliest.timestamp() and later <= now.timestamp():
-        notes.append(
-            f"the date of {own.source} is {_day(begin)}: if it should be {_day(later)},"
-            " the receiver is 1024 weeks back, a rollover of the weeks of GPS; only the"
-            " date is affected"
-        )
-    return own
-
-
-def _day(seconds: float) -> str:
-    return clock_text(seconds)[:10]
-
-
 def times_of(values: list[Value], clock: Clock) -> Floats:
     """Time of each value, s: its own, else that of the clock at its line."""
     lines, own, _ = np.array(values).T
@@ -183,9 +142,8 @@ def times_of(values: list[Value], clock: Clock) -> Floats:
     if not is_known.any():
         return by_line
 
-    t = own + clock.later
     # a time of the day is that of the day on which its line stands
-    t = t + DAY * np.round((by_line - t) / DAY)
+    t = own + DAY * np.round((by_line - own) / DAY)
     known = t[is_known]
     of_known = lines[is_known]
     distinct = np.unique(known).size

@@ -16,8 +16,8 @@ from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.readers.message_clock import log_clock
 from shipgym.trials.readers.message_tracks import Track, choose_tracks
 from shipgym.trials.readers.messages import Heard, is_wind
+from shipgym.trials.readers.nmea0183 import hear_sentences
 from shipgym.trials.readers.nmea2000 import hear_pgns
-from shipgym.trials.readers.nmea_log import hear_sentences
 from shipgym.trials.readers.signalk import hear_deltas
 
 
