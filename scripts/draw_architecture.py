@@ -26,7 +26,7 @@ ROOMS: dict[str, tuple[float, int, str]] = {
     "agents.verification": (3.5, 1, "the chain of shipgym autopilot"),
     "agents.rollouts": (1.25, 2, "one loop, metrics, replays"),
     "agents.jobs": (3.5, 2, "processes, Ray"),
-    "agents.export": (2.37, 2, "C99, FMU, NMEA 0183"),
+    "agents.export": (2.37, 2, "C99, FMU"),
     "agents.policies": (0.5, 3, "learned policies, ONNX"),
     "agents.controllers": (2, 3, "PID, LQ, LQG, wheel-over, MPC"),
     "agents.suites": (3.5, 3, "tasks and seeds of benchmarks"),

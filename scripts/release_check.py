@@ -49,11 +49,6 @@ env = gymnasium.make("shipgym/CourseKeeping-v0", render_mode="rgb_array")
 env.reset(seed=0)
 assert env.render().shape == (600, 600, 3)
 """
-NMEA = """
-from agents.export.nmea import library, readings, sentences
-assert library("serial").VERSION
-assert readings(sentences("HEHDT,180.0,T").strip())[0].quantity == "heading"
-"""
 LOGS = """
 import pandas
 from shipgym import Trial
@@ -110,7 +105,6 @@ TRIED: dict[str, tuple[str | tuple[str, ...], ...]] = {
         ),
     ),
     "fmu": (("export", "mariner", "--fmu", "mariner.fmu"),),
-    "nmea": (NMEA,),
     "logs": (LOGS,),
     "rl": (("train", *LEARN, "--out", "run"),),
     "tune": (("tune", *LEARN, "--trials", "1", "--out", "study"),),

@@ -15,7 +15,6 @@ import re
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 from typing import Annotated
 
@@ -63,9 +62,6 @@ SHOWN = {
 }
 
 
-START = 8.0  # s, until a program that runs beside the others listens
-
-
 def write_logs(folder: Path) -> None:
     """Two zigzags and two turning circles of a container ship, a CSV file each."""
     ship = mmg_ship("kcs")
@@ -104,17 +100,7 @@ def logged(run: Trial, number: int) -> pd.DataFrame:
 
 
 def run_command(command: str, folder: Path) -> str:
-    """Output of a command without needless lines; empty if it ends in `&`."""
-    if command.endswith("&"):
-        subprocess.Popen(
-            command[:-1],
-            shell=True,
-            cwd=folder,
-            stdout=subprocess.DEVNULL,
-            env=environment(),
-        )
-        time.sleep(START)
-        return ""
+    """Output of a command without needless lines."""
     done = subprocess.run(
         command,
         shell=True,

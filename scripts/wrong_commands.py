@@ -43,12 +43,9 @@ RIGHT: dict[str, list[str]] = {
     "reduce": [SHIP, "--out", "out"],
     "autopilot": [SHIP, "--out", "out"],
     "export": [AGENT, "--onnx", "out"],
-    "steer": [AGENT, "--nmea", "tcp:256.0.0.1:1"],  # where nobody can
-    "simulate": ["mariner", "--nmea", "tcp:256.0.0.1:1"],
     "train": ["ppo", "--out", "out"],
     "tune": ["ppo", "--out", "out"],
     "benchmark": ["--controllers", "pid", "--out", "out"],
-    "warm": ["mariner"],
     "trials": ["mariner"],
     "replay": ["episode.json", "--out", "out.html"],
     "doctor": [],
@@ -133,11 +130,7 @@ def lines() -> Iterator[list[str]]:
         yield [name, *right, "--no-such-option=3", "3"]
         yield [name, *right, ""]
         needed = right[: 1 + right.index("--out")] if "--out" in right else right
-        yield from (
-            [name, *right[:k]]
-            for k in range(len(needed))
-            if name not in ("doctor", "warm")
-        )
+        yield from ([name, *right[:k]] for k in range(len(needed)) if name != "doctor")
         for parameter in command.params:
             kind = str(get_type_hints(command.callback).get(parameter.name))
             yield from ([name, *words] for words in _wrong(parameter, kind, right))

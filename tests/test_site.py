@@ -34,7 +34,7 @@ NARROW = (
     "theory/motion.html",
     "theory/identification.html",
     "theory/autopilots.html",
-    "howto/nmea.html",
+    "howto/control_loop.html",
     "api/shipgym.html",
     "notebooks/identify.html",
 )

@@ -1,21 +1,16 @@
 """The walks of `docs/architecture.md`: a journey enters the functions that its walk
 names, in their order."""
 
-import asyncio
 import re
 import sys
-from contextlib import suppress
 from pathlib import Path
-from threading import Thread
 
 import pytest
 from typer.testing import CliRunner
 
 from agents import LQ, load_agent
 from agents.cli import app
-from agents.export.simulated import SimulatedShip, simulate_ship
 from shipgym import example_ship, load_model
-from tests.agents.steering import free_port
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
@@ -44,37 +39,10 @@ def cell(folder):
     run("benchmark", *arguments.split(), folder / "results")
 
 
-def helm(folder):
-    model = load_model("mariner-tls-svm")
-    LQ.from_model(model).save(folder / "lq.json")
-    address = f"tcp:127.0.0.1:{free_port()}"
-    passage = simulate_ship(
-        SimulatedShip(model), address, duration=3600.0, speed_up=5.0
-    )
-    loop = asyncio.new_event_loop()
-    sailing = loop.create_task(passage)
-
-    def sail():
-        with suppress(asyncio.CancelledError):
-            loop.run_until_complete(sailing)
-
-    ship = Thread(target=sail)
-    ship.start()
-    options = ["--heading", 5, "--duration", 20, "--speed-up", 5]
-    options += ["--limit", "late_s=60"]  # whatever else the computer does
-    try:
-        run("steer", folder / "lq.json", "--nmea", address, *options)
-    finally:
-        loop.call_soon_threadsafe(sailing.cancel)
-        ship.join()
-        loop.close()
-
-
 WALKS = {
     "From a log to a model": log_to_model,
     "From a model to an autopilot": model_to_autopilot,
     "A cell of the benchmark": cell,
-    "The helm": helm,
 }
 
 

@@ -37,10 +37,8 @@ try:
     )
     from agents.cli.logs import look_command, new_ship_command
     from agents.cli.reproduction import reproduce_command
-    from agents.cli.steer import simulate_command, steer_command
     from agents.cli.training import train_command, tune_command
     from agents.cli.trials import trials_command
-    from agents.cli.warm import warm_command
 except KeyboardInterrupt:  # Ctrl-C before any command began
     sys.exit(130)
 
@@ -124,14 +122,6 @@ COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
     "trials": (trials_command, "my_ship/model.json --out trials.html"),
     "autopilot": (autopilot_command, "ship.toml --draws 200 --out report/"),
     "export": (export_command, "report/lq.json --c lq/"),
-    "steer": (
-        steer_command,
-        "report/lq.json --nmea tcp:192.168.1.20:10110 --heading 45",
-    ),
-    "simulate": (
-        simulate_command,
-        "my_ship/model.json --nmea tcp:127.0.0.1:10110 --sea moderate",
-    ),
     "train": (
         train_command,
         "sac --env path-following --model my_ship/model.json --out run/",
@@ -142,7 +132,6 @@ COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
         "--suite shipgym-v1 --controllers pid,lq,ppo --out results/",
     ),
     "reproduce": (reproduce_command, "cao2015 --markdown tables.md"),
-    "warm": (warm_command, "my_ship/model.json"),
     "replay": (replay_command, "recordings/episode-0.json --out replay.html"),
     "doctor": (doctor_command, "--json"),
 }

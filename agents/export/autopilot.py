@@ -23,7 +23,6 @@ from agents.controllers.law import (
     wrapped,
 )
 from agents.controllers.memory import from_columns
-from agents.export.transfer import Transfer
 from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.engine.records import field_types
@@ -277,8 +276,6 @@ class Autopilot:
         Control interval, s.
     limit : float
         Largest rudder of the ship, rad.
-    largest : float
-        Largest rudder that it orders, rad; may be set lower.
     """
 
     def __init__(self, agent: Any) -> None:
@@ -290,13 +287,11 @@ class Autopilot:
         self.parameters = bridge_parameters(agent)
         self.dt = self.parameters.dt
         self.limit = self.parameters.limit
-        self.largest = self.limit
         self.switch_on()
         self._given: Any = None
 
     def switch_on(self) -> None:
         """Forget what was before; the order is that of the law at once."""
-        self.transfer: Transfer | None = None
         guidance: Any = Nothing()
         if isinstance(self.agent, Guided):
             guidance = _no_memory(self.agent)
@@ -309,48 +304,19 @@ class Autopilot:
             guidance=guidance,
         )
 
-    def engage(self, rudder: float) -> None:
-        """Take over from a rudder angle, rad, without a jump of the order."""
-        self.switch_on()
-        lengths = 0.5  # in which the rudder comes to that of the law
-        scales = zip(
-            self.agent.observation_names,
-            self.agent.observation_scales,
-            strict=True,
-        )
-        turning = dict(scales).get("yaw_rate", 0.05)  # speed over length, rad/s
-        self.transfer = Transfer(rudder, lengths / turning)
-
-    @property
-    def integral(self) -> float:
-        """Integral of the heading error, rad s."""
-        return float(self.state.integral[0])
-
-    @property
-    def last_command(self) -> float:
-        """Rudder ordered last, rad."""
-        return float(self.state.last_command[0])
-
     def step(self, given: Mapping[str, float]) -> float:
-        """Ordered rudder, rad, at most `largest`, for the numbers named in `inputs`."""
+        """Ordered rudder, rad, at most `limit`, for the numbers named in `inputs`."""
         numbers = {name: np.array([given[name]]) for name in self.inputs}
         inputs = BridgeInput(**numbers)
         self._given = inputs
-        p = self.parameters._replace(limit=self.largest)
-
+        p = self.parameters
         state = self.state
         if isinstance(self.agent, Guided):
             order, after = path_step(inputs, state, p, self._guide, self._law)
         else:
             order, after = heading_step(inputs, state, p, self._law)
         self.state = after
-        if self.transfer is None or self.transfer.has_ended:
-            return float(order[0])
-
-        of_transfer = self.transfer.order(float(order[0]), self.dt)
-        ordered = min(max(of_transfer, -self.largest), self.largest)
-        self.state = after._replace(last_command=np.array([ordered]))
-        return ordered
+        return float(order[0])
 
     def _guide(self, seen: PathSignals, memory: Any, _: Any) -> tuple[Number, Any]:
         """Course of guidance, by its law or by a search of its own."""

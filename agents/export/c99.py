@@ -1,4 +1,4 @@
-"""C99, XML and sentences of NMEA 0183, made from templates."""
+"""C99 and XML made from templates."""
 
 import re
 from collections.abc import Iterable
@@ -14,7 +14,6 @@ from agents.export.c_structures import Parameter
 from agents.export.c_syntax import KEYWORDS, comment, literal
 from agents.export.variables import Variables
 from shipgym import InputError
-from shipgym.trials.units import UNITS
 
 
 @dataclass(frozen=True)
@@ -111,21 +110,6 @@ def single(number: float) -> str:
     return f"{number:.9e}f"
 
 
-def degrees(angle: float) -> float:
-    """An angle, rad, in degrees with four decimals."""
-    return round(float(np.degrees(angle)), 4)
-
-
-def knots(speed: float) -> float:
-    """A speed, m/s, in knots with four decimals."""
-    return round(speed / UNITS["speed"]["kn"], 4)
-
-
-def heading(angle: float) -> float:
-    """An angle, rad, in degrees from 0 to below 360 with four decimals."""
-    return round(float(np.degrees(angle)) % 360.0, 4) % 360.0
-
-
 def array(numbers: Iterable[Any]) -> str:
     """Numbers of an array in single precision as C initialises it."""
     entries = []
@@ -149,9 +133,6 @@ def _environment() -> Environment:
         "c": literal,
         "comment": comment,
         "floats": array,
-        "deg": degrees,
-        "knots": knots,
-        "heading": heading,
     }
     environment.tests["calling"] = _calls
     return environment

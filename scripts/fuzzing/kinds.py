@@ -22,10 +22,6 @@ from agents.benchmarking.cells import Cell, job_of, run_job
 from agents.benchmarking.entries import Entry
 from agents.benchmarking.results import collect
 from agents.cli.benchmark_tables import costs_table, ranking_table
-from agents.export.helm import Helm
-from agents.export.nmea import Line
-from agents.export.route import Route
-from agents.export.sensors import Limits
 from agents.job_results import (
     KeptResults,
     job_to_json,
@@ -232,45 +228,12 @@ def read_cell(path: Path) -> Any:
     return collect(SUITE, [TASK], [ENTRY], cells, EPISODES)
 
 
-@cache
-def pid() -> Any:
-    """An autopilot to be told what is read."""
-    return load_agent(CORPUS / "controller" / "pid.json")
-
-
 def read_zip(path: Path) -> Any:
     """An agent of stable-baselines3, as one that learned the first task."""
     return read_sb3(path).policy(Task.of("CourseKeeping"), load_model("mariner"))
 
 
-def read_bridge(path: Path) -> Helm:
-    """A helm that was told the bytes of a line, and steers by what it understood."""
-    helm = Helm(pid(), 0.5, Limits(silence_s=1e9))
-    Line(lambda text, source: helm.hear(text, source, 0.0), set()).data_received(
-        read_bytes(path, "log", LARGEST_TOML)
-    )
-    for now in range(4):
-        helm.watch(1.0, float(now))
-        helm.steer(float(now))
-    return helm
-
-
-def use_helm(helm: Helm) -> None:
-    """What it sends, and its order, which is a number within the limit."""
-    if not abs(helm.order) <= helm.pilot.limit:
-        raise AssertionError(f"order {helm.order}")
-    helm.sentences().encode("ascii")
-
-
-def use_route(route: Route) -> None:
-    """Where a ship at its beginning stands on it."""
-    if not np.isfinite([*route.given(*np.radians(route.origin)).values()]).all():
-        raise AssertionError(f"{route.plan}: not finite")
-
-
 KINDS = (
-    Kind("bridge", read_bridge, use_helm, slow=2),
-    Kind("route", lambda path: Route.from_csv(path, 500.0), use_route),
     Kind(
         "ship-file",
         lambda path: ShipFile.load(path).trials(),

@@ -165,7 +165,7 @@ def announce(what: str, folder: Path | None) -> None:
     """Announce to a waiting user what is compiled, and where it is stored."""
     kept = "kept in memory only"
     if folder:
-        kept = f"kept in {folder} (beforehand: shipgym warm)"
+        kept = f"kept in {folder}"
     # typical compilation time of a loop on a laptop, for the announcement
     seconds = 7
     tell_who_waits(f"shipgym: compiling {what}, once, about {seconds} s; {kept}")

@@ -99,7 +99,6 @@ def test_every_command_has_json_and_quiet_and_an_example_that_it_takes(name):
         ["new-ship", "SHIP/../zigzag_10_10.csv", "--out", "OUT/new.toml"],
         ["trials", "mariner", "--draws", "0"],
         ["export", "mariner", "--c", "OUT/mariner"],
-        ["simulate", "mariner", "--nmea", "udp:127.0.0.1:9", "--duration", "0.1"],
     ],
 )
 def test_json_is_all_that_is_printed_and_with_quiet_nothing(words, demo, tmp_path):

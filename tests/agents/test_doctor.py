@@ -1,25 +1,17 @@
-"""`shipgym doctor` and `shipgym warm`: the installation, and the cache of compiled
-ships."""
+"""`shipgym doctor`: the installation, and the cache of compiled ships."""
 
 import errno
 import importlib.metadata
 import json
 import os
 import re
-import subprocess
-import sys
 import tempfile
-import warnings
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
 
 from agents.cli import app, doctor
-from agents.cli.warm import warm_jobs, warm_names
-from shipgym import InputError
-from shipgym.engine.cache_folder import CacheWarning
 
 ROOT = Path(__file__).parents[2]
 
@@ -80,45 +72,6 @@ def test_doctor_tells_of_a_cache_that_is_damaged_or_open_to_others(
 def test_doctor_has_a_mark_for_each_state(state, mark):
     line = doctor.Finding("cache", state, "and why").line().plain
     assert line.split() == [mark, "cache", "and", "why"]
-
-
-def test_warm_compiles_into_the_cache_and_writes_nothing_else(tmp_path):
-    cache, here = tmp_path / "cache", tmp_path / "here"
-    here.mkdir()
-    command = [
-        sys.executable,
-        "-m",
-        "agents.cli",
-        "warm",
-        "shipgym/CourseKeeping-v0",
-        "--json",
-    ]
-    environment = {**os.environ, "SHIPGYM_CACHE": str(cache), "PYTHONPATH": str(ROOT)}
-    answer = subprocess.run(
-        command, cwd=here, env=environment, capture_output=True, text=True, check=True
-    )
-    told = json.loads(answer.stdout)
-    assert told["cache"] == str(cache)
-    assert [one["refused"] for one in told["ready"]] == ["", ""]
-    assert len(list(cache.glob("*.loop"))) == 2
-    assert not list(here.iterdir())
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Windows has other permissions")
-def test_warm_fills_no_cache_that_would_not_be_used(tmp_path):
-    tmp_path.chmod(0o777)
-    answer = subprocess.run(
-        [sys.executable, "-m", "agents.cli", "warm"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "SHIPGYM_CACHE": str(tmp_path)},
-    )
-    assert answer.returncode == 2
-    assert "may be written by other users" in answer.stderr
-    assert "there is no cache to fill" in answer.stderr
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_cache_that_can_only_be_read_is_of_use_if_something_is_in_it(
@@ -202,72 +155,3 @@ def test_needed_packages_and_extras_are_told_apart(monkeypatch):
     assert checked[:5] == ["shipgym", "numpy", "tomli", "extra report", "cache"]
     monkeypatch.setattr(importlib.metadata, "requires", lambda name: None)
     assert doctor.declared_packages() == {}
-
-
-def test_warm_takes_what_is_named_or_all_there_is():
-    everything = warm_names(None, True)
-    assert {"shipgym/CourseKeeping-v0", "mariner", "kvlcc2-mmg"} <= set(everything)
-    assert warm_names(["tanker"], True) == everything
-    assert warm_names(["tanker"], False) == ["tanker"]
-    assert "shipgym/CourseKeeping-v0" in warm_names(None, False)
-    assert list(warm_jobs("shipgym/CourseKeeping-v0")) == [
-        "shipgym/CourseKeeping-v0 in calm water",
-        "shipgym/CourseKeeping-v0 in a sea",
-    ]
-    assert {"tanker: zigzag", "tanker: open_loop"} <= warm_jobs("tanker").keys()
-
-
-@pytest.mark.parametrize("name", ["titanic", "CartPole-v1"])
-def test_warm_refuses_what_is_no_environment_and_no_model(name):
-    answer = shipgym("warm", name)
-    assert answer.exit_code == 2
-    message = f"expected an environment's id or a model, got '{name}'"
-    assert message in " ".join(answer.stderr.split())
-
-
-def test_warm_makes_the_environment_of_a_task_with_a_ship_and_closes_it(monkeypatch):
-    made = []
-
-    def make(env_id, **options):
-        made.append((env_id, options))
-        return SimpleNamespace(close=lambda: made.append("closed"))
-
-    monkeypatch.setattr("gymnasium.make", make)
-    fairway = str(ROOT / "examples" / "fairway.py")
-    jobs = warm_jobs(fairway, "kvlcc2")
-    assert list(jobs) == [f"{fairway} in calm water", f"{fairway} in a sea"]
-    for compile_it in jobs.values():
-        compile_it()
-    options = {"model": "kvlcc2", "task": fairway}
-    assert made == [
-        ("shipgym/CourseKeeping-v0", options),
-        "closed",
-        ("shipgym/CourseKeeping-v0", {**options, "sea": "rough"}),
-        "closed",
-    ]
-
-
-def test_warm_goes_on_after_a_refusal_only_if_all_was_asked_for(monkeypatch):
-    def make(env_id, **options):
-        if "sea" in options:
-            raise InputError("no beam")
-        return SimpleNamespace(close=lambda: None)
-
-    monkeypatch.setattr("gymnasium.make", make)
-    monkeypatch.setattr("shipgym.models.list_models", list)
-    answer = shipgym("warm", "--all", "--json")
-    assert answer.exit_code == 0
-    refused = [one["refused"] for one in json.loads(answer.stdout)["ready"]]
-    assert set(refused) == {"", "no beam"}
-    answer = shipgym("warm", "shipgym/CourseKeeping-v0")
-    assert (answer.exit_code, answer.stderr) == (2, "error: no beam\n")
-
-
-def test_warm_ends_with_an_error_if_nothing_can_be_kept(monkeypatch):
-    def make(env_id, **options):
-        warnings.warn("/cache: cannot be written", CacheWarning, stacklevel=1)
-
-    monkeypatch.setattr("gymnasium.make", make)
-    answer = shipgym("warm", "shipgym/CourseKeeping-v0")
-    assert answer.exit_code == 2
-    assert answer.stderr.endswith("in calm water: /cache: cannot be written\n")

@@ -37,10 +37,6 @@ TASK_OF_OWN = (
     "--env course-keeping --model mariner --sea calm --option episode_steps=20"
 )
 LEARNING = "--settings ppo.toml --total-steps 32"
-PILOT = (
-    "--nmea udp:127.0.0.1:0 --gear udp:127.0.0.1:9 --duration 0.5 --speed-up 10 --limit"
-    " silence_s=2"
-)
 
 #: Command lines in their order (later ones use what earlier ones wrote), each with its
 #: exit code; every command also takes --json and --quiet.
@@ -75,18 +71,6 @@ LINES = (
     ("export report/lq.json --c c --fmu lq.fmu --fmi 2.0 --name lq --float", 0),
     ("export sharp-turns-ppo-s1 --onnx policy.onnx", 0),
     ("export tanker --c tanker --depth 25", 0),
-    (f"steer report/turn-rate.json {PILOT} --heading 45 --rate-of-turn 10", 0),
-    (
-        f"steer report/lq.json {PILOT} --variation -2 --no-rudder-feedback --page 0"
-        " --log steer.nmea",
-        0,
-    ),
-    (f"steer report/lq.json {PILOT} --rudder-feedback --route route.csv", 2),
-    (
-        "simulate mariner --nmea udp:127.0.0.1:9 --gear udp:127.0.0.1:0 --leg 30 --sea"
-        " slight --seed 1 --drop HDT=1 --duration 0.2 --speed-up 10",
-        0,
-    ),
     (
         f"train ppo {TASK_OF_OWN} {LEARNING} {SMALL} --randomise --from-nothing --seed"
         " 1 --threads 1 --max-seconds 60 --out run",
@@ -118,7 +102,6 @@ LINES = (
         " --out accepted",
         0,
     ),
-    ("warm mariner --model mariner", 0),
     ("replay recordings/episode-00000.json --out replay.html", 0),
     ("doctor", 0),
 )
@@ -127,7 +110,6 @@ MODULES = sorted(
     for name in {*packages_distributions(), *sys.stdlib_module_names}
     if name.isidentifier() and name not in ("shipgym", "identification", "agents")
 )
-ALL = ["warm", "--all"]  # in plain Python, since it compiles for minutes
 
 
 def options():
@@ -145,7 +127,7 @@ def options():
 
 def test_every_option_has_a_command_line_here():
     lines = [shlex.split(line) for line, _ in LINES]
-    tried = {(words[0], word) for words in [*lines, ALL] for word in words[1:]}
+    tried = {(words[0], word) for words in lines for word in words[1:]}
     missing = [
         f"{name} {flag}" for name, flag in options() if (name, flag) not in tried
     ]
@@ -166,7 +148,6 @@ def data(tmp_path_factory):
     write_suite(folder)
     PID.from_model(load_model("mariner")).save(folder / "pid.json")
     (folder / "ppo.toml").write_text("gamma = 0.98\n")
-    (folder / "route.csv").write_text("latitude,longitude\n0,0\n0,0.1\n0.1,0.1\n")
     env = gymnasium.make("shipgym/CourseKeeping-v0", episode_steps=5)
     with RecordEpisode(env, folder / "recordings") as env:
         env.reset(seed=1)
@@ -196,13 +177,6 @@ def run(*words, **environment):
         text=True,
         check=False,
     )
-
-
-def test_all_can_be_warmed(data, monkeypatch):
-    monkeypatch.chdir(data)
-    answer = run(*ALL, NUMBA_DISABLE_JIT="1")
-    assert answer.returncode == 0, answer.stderr
-    assert "160/160" in answer.stdout
 
 
 def test_processes_of_a_command_take_no_modules_from_the_folder_of_data(
