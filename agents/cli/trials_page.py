@@ -107,8 +107,6 @@ def readable_index(name: str) -> str:
         "_s": "s",
     }
     words = name.replace("_", " ")
-    if name == "final_speed":
-        return f"{words}, m/s"
     for ending, unit in units.items():
         if name.endswith(ending):
             return f"{words[: -len(ending)]}, {unit}"

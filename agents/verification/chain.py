@@ -33,7 +33,7 @@ from shipgym.checks import check_number, placed, quoted
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.extras import library
 from shipgym.files import write_json
-from shipgym.manoeuvres.verdicts import with_measured
+from shipgym.manoeuvres.criteria import with_measured
 from shipgym.models import ShipModel
 from shipgym.plots import graph_objects
 from shipgym.tasks.task import course_keeping_task

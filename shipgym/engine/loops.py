@@ -52,11 +52,6 @@ LOOPS = {
         f"UniTuple(int64, 2)({TABLE}, {VECTOR}, float64, float64, float64, float64,"
         f" boolean, {SEA}, {VECTOR})",
     ),
-    "steer_rate": Loop(
-        steered.steer_rate,
-        f"int64({TABLE}, {VECTOR}, {VECTOR}, float64, float64, float64, float64,"
-        f" float64, {SEA}, {VECTOR})",
-    ),
     "segments": Loop(
         batches.sail_segment,
         f"void({VECTOR}, {VECTOR}, {VECTOR}, {TABLE}, int64[::1], {TABLE})",

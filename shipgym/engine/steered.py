@@ -1,4 +1,4 @@
-"""One ship steered by a rule: through a zigzag, or held to a yaw rate.
+"""One ship steered through a zigzag.
 
 Arguments and rows are those of `shipgym.engine.trajectories`.
 """
@@ -6,7 +6,6 @@ Arguments and rows are those of `shipgym.engine.trajectories`.
 from typing import Any
 
 from shipgym.engine.hooks import load_coefficients, load_motion, load_ship, store_motion
-from shipgym.engine.mathematics import clip
 from shipgym.engine.motion import Motion, Push, Ship, lost, sail
 from shipgym.engine.specialise import called
 from shipgym.engine.trajectories import follow, push_now, replaced
@@ -125,43 +124,3 @@ def zigzag(
         motion = replaced(motion, heading, motion.delta, motion.n)
         store_motion(out[i], 0, motion)
     return last, reversals
-
-
-def steer_rate(
-    out: Any,
-    commands: Any,
-    memory: Any,
-    rate: float,
-    n: float,
-    h: float,
-    gain: float,
-    reset_time: float,
-    sea: Any,
-    rng_state: Any,
-    parameters: Any,
-    numbers: Any,
-) -> int:
-    """Hold the yaw rate at `rate`, as in the reverse spiral of Bech.
-
-    The helmsman is proportional and integral. `commands` receives the rudder angle held
-    from each sample on; `memory` holds the integral part of his rudder and is changed.
-    """
-    ship = load_ship(numbers)
-    coefficients = load_coefficients(numbers)
-    motion = load_motion(out[0])
-    limit = ship.rudder_limit
-    integral = memory[0]
-    last = len(out) - 1
-    for i in range(last):
-        error = rate - motion.r
-        integral = clip(integral + gain * error * h / reset_time, -limit, limit)
-        rudder = clip(gain * error + integral, -limit, limit)
-        commands[i] = rudder
-        pushed = push_now(motion, sea, parameters)
-        motion = sail(motion, rudder, n, h, pushed, coefficients, ship)
-        if lost(motion, ship):
-            last = i
-            break
-        follow(out, i + 1, motion, h, sea, rng_state, parameters)
-    memory[0] = integral
-    return last

@@ -5,7 +5,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from shipgym.checks import check_number
-from shipgym.manoeuvres.evidence import Side
+from shipgym.manoeuvres.criteria import (
+    Criterion,
+    Side,
+    criterion_of,
+    outside_envelope,
+)
 from shipgym.manoeuvres.imo_rules import (
     STOPPING,
     imo_manoeuvres,
@@ -13,11 +18,6 @@ from shipgym.manoeuvres.imo_rules import (
     trial_in_words,
 )
 from shipgym.manoeuvres.intervals import IndexInterval, intervals_of, own_indices
-from shipgym.manoeuvres.verdicts import (
-    Criterion,
-    criterion_of,
-    outside_envelope,
-)
 from shipgym.models.by_name import takes_name
 from shipgym.models.ship_model import ShipModel
 

@@ -247,7 +247,6 @@ def is_size(index: str) -> bool:
         "loop_width_deg",
         "loop_height_deg_s",
         "track_reach_lengths",
-        "distance_lengths",
         "time_s",
     )
     return index in sizes

@@ -156,10 +156,9 @@ def standard_manoeuvres(
     -------
     dict of str to Manoeuvre
         Zigzags 10/10 and 20/20, turning circles with full rudder and pull-outs, each to
-        both sides; a direct spiral, and a reverse spiral where the ship is unstable on
-        a straight course; with a shaft an inertia stop and an acceleration, and a crash
-        stop where her equations hold for a shaft astern; and what was registered
-        besides (`register_manoeuvre`).
+        both sides; a direct spiral; with a shaft an inertia stop, and a crash stop
+        where her equations hold for a shaft astern; and what was registered besides
+        (`register_manoeuvre`).
     """
     found = dict[str, Manoeuvre]()
     for family in families_of(model, water_depth).values():

@@ -1,32 +1,25 @@
-"""Spirals, which show whether, and how far, a ship is unstable on a straight course.
+"""Spirals and pull-outs, which show whether a ship keeps a straight course.
 
-Direct spiral of Dieudonne and reverse spiral of Bech as described in IMO MSC/Circ.1053
-and ITTC 7.5-04-02-01.
+Direct spiral of Dieudonne and pull-out as described in IMO MSC/Circ.1053 and ITTC
+7.5-04-02-01.
 """
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_number
+from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.manoeuvres.execution import is_ordered, require, rudder
-from shipgym.manoeuvres.registry import Manoeuvre
-from shipgym.manoeuvres.settling import Voyage
+from shipgym.manoeuvres.execution import require, rudder, turning_rudder
+from shipgym.manoeuvres.registry import SIDES, Manoeuvre
+from shipgym.manoeuvres.voyage import Voyage
 from shipgym.models.by_name import takes_name
-from shipgym.models.linear import is_course_stable
 from shipgym.models.ship_model import ShipModel
-from shipgym.models.simulate import Conditions, Seed
-from shipgym.sea.conditions import Weather
 from shipgym.trials.trial import Trial
-
-SpiralMethod = Literal["direct", "reverse"]
 
 #: Rudder angles of the direct spiral, degrees, from starboard to port: in small steps
 #: where the loop is.
@@ -56,8 +49,6 @@ class Spiral:
     # deg and deg/s
     rudder_deg: Floats
     yaw_rate_deg_s: Floats
-    # whether the rudder was set and the yaw rate observed, or the other way round
-    method: SpiralMethod
 
 
 @dataclass(frozen=True)
@@ -88,8 +79,6 @@ def direct_spiral(
     rudder_deg: Sequence[float] = DIRECT_RUDDER_DEG,
     dt: float | None = None,
     water_depth: float = np.inf,
-    weather: Weather | str | None = None,
-    seed: Seed = 0,
 ) -> Spiral:
     """Simulate a direct spiral (Dieudonne).
 
@@ -100,88 +89,30 @@ def direct_spiral(
     are as in `pull_out`. Raises InputError for angles that do not go from one side to
     the other, UnstableModelError if the ship runs away.
     """
-    limit = model.steering.rudder_limit_deg
-    there = one_way(rudder_deg, "rudder_deg", "deg", limit, "the rudder's limit")
+    there = _one_way(rudder_deg, model.steering.rudder_limit_deg)
     angles = [*there, *there[-2::-1]]
-    voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
+    voyage = Voyage(model, dt, water_depth)
     rates = []
     for angle in angles:
-        leg = voyage.hold(np.radians(angle), model.service_shaft_speed)
-        steady = voyage.settle(leg)
-        rates.append(steady.yaw_rate)
+        rate = voyage.settle(np.radians(angle), model.service_shaft_speed)
+        rates.append(rate)
     return Spiral(
         trial=voyage.trial("spiral"),
         rudder_deg=np.array(angles),
         yaw_rate_deg_s=np.degrees(rates),
-        method="direct",
     )
 
 
-@takes_name
-def reverse_spiral(
-    model: ShipModel,
-    yaw_rate_deg_s: Sequence[float] | None = None,
-    dt: float | None = None,
-    water_depth: float = np.inf,
-    weather: Weather | str | None = None,
-    seed: Seed = 0,
-) -> Spiral:
-    """Simulate a reverse spiral (Bech).
-
-    A helmsman keeps a sequence of yaw rates, each until it is steady.
-
-    It also finds the turns at which an unstable ship would not stay by itself. The
-    helmsman is a proportional-integral controller, designed from the rudder's effect on
-    the ship.
-
-    The yaw rates, degrees per second, go from one side to the other, by default from
-    0.2 to -0.2 times U0 / L; the rudder of each point is the mean of what the helmsman
-    ordered. Otherwise as `direct_spiral`.
-    """
-    voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
-    length_time = voyage.length_time
-    # Yaw rates of the reverse spiral by U0 / L, from starboard to port.
-    reverse_rates = (0.2, 0.15, *(0.01 * k for k in range(12, -13, -1)), -0.15, -0.2)
-    if yaw_rate_deg_s is None:
-        defaults = np.array(reverse_rates) / length_time
-        yaw_rate_deg_s = np.degrees(defaults).tolist()
-    rates = one_way(
-        yaw_rate_deg_s,
-        "yaw_rate_deg_s",
-        "deg/s",
-        limit=float(np.degrees(1.0 / length_time)),
-        what="one radian per ship length sailed",
-    )
-
-    helmsman = voyage.rate_helmsman()
-    angles = []
-    for rate in rates:
-        leg = helmsman(np.radians(rate))
-        steady = voyage.settle(leg)
-        angles.append(steady.rudder)
-    return Spiral(
-        trial=voyage.trial("spiral"),
-        rudder_deg=np.degrees(angles),
-        yaw_rate_deg_s=np.array(rates),
-        method="reverse",
-    )
-
-
-def one_way(
-    values: Sequence[float], argument: str, unit: str, limit: float, what: str
-) -> list[float]:
-    """Values that go strictly from one side to the other, within a limit, checked.
-
-    `what`: the limit in words.
-    """
+def _one_way(angles: Sequence[float], limit: float) -> list[float]:
+    """Rudder angles that go strictly from one side to the other, degrees, checked."""
     numbers = []
-    for i, value in enumerate(values):
+    for i, angle in enumerate(angles):
         number = check_number(
-            value,
-            f"{argument}[{i}]",
+            angle,
+            f"rudder_deg[{i}]",
             at_least=-limit,
             at_most=limit,
-            hint=f"{what} in {unit}",
+            hint="the rudder's limit in deg",
         )
         numbers.append(number)
     steps = np.diff(numbers)
@@ -189,86 +120,23 @@ def one_way(
     enough = len(numbers) >= 3
     if not enough or not strictly or numbers[0] * numbers[-1] >= 0.0:
         raise InputError(
-            f"{argument}: expected at least 3 values in {unit} that rise or fall from"
-            f" one side to the other, such as 10, 5, 0, -5, -10, got {numbers}"
+            "rudder_deg: expected at least 3 angles in deg that rise or fall from one"
+            f" side to the other, such as 10, 5, 0, -5, -10, got {numbers}"
         )
     return numbers
 
 
-def spiral_from_trial(
-    trial: Trial, rudder_deg: Sequence[float] | None = None, tolerance_deg: float = 0.5
-) -> Spiral:
-    """The steady turns of a measured direct spiral.
-
-    A turn lasts while the rudder stays within a tolerance, or its order unchanged where
-    that was recorded; its yaw rate is the mean over the last third. The trial has r and
-    delta (or delta_command). With `rudder_deg` only turns within the tolerance of these
-    angles are kept, all in degrees. Raises InputError if a channel is missing, or there
-    are fewer than four steady turns.
-    """
-    require(trial, ("r",), "a spiral")
-    tolerance = check_number(tolerance_deg, "tolerance_deg", above=0.0)
-    delta = np.degrees(rudder(trial))
-    rate = np.degrees(trial["r"])
-    angles = []
-    rates = []
-    for first, last in _plateaus(trial, delta, tolerance):
-        angle = float(delta[first:last].mean())
-        if rudder_deg is not None and not _near(angle, rudder_deg, tolerance):
-            continue
-        third = max((last - first) // 3, 1)
-        steady = rate[last - third : last]
-        angles.append(angle)
-        rates.append(float(steady.mean()))
-    if len(angles) < 4:
-        raise InputError(
-            f"trial {trial.name!r}: expected at least 4 rudder angles, each held for a"
-            f" while, got {len(angles)} steady turns"
-        )
-    return Spiral(
-        trial=trial,
-        rudder_deg=np.array(angles),
-        yaw_rate_deg_s=np.array(rates),
-        method="direct",
-    )
-
-
-def _plateaus(trial: Trial, delta: Floats, tolerance: float) -> list[tuple[int, int]]:
-    """First samples of each stretch of a held rudder, deg, and of what comes after it.
-
-    Without those shorter than a tenth of the longest, the rudder on its way.
-    """
-    allowed = 1e-9 if is_ordered(trial) else tolerance
-    edges = [0]
-    for i, angle in enumerate(delta):
-        held = delta[edges[-1]]
-        if abs(angle - held) > allowed:
-            edges.append(i)
-    edges.append(len(delta))
-
-    t = trial.t
-    durations = {}
-    for first, after in pairwise(edges):
-        durations[first, after] = t[after - 1] - t[first]
-    shortest = 0.1 * max(durations.values())
-    return [
-        span
-        for span, duration in durations.items()
-        if duration > 0.0 and duration >= shortest
-    ]
-
-
-def _near(angle: float, wanted: Sequence[float], tolerance: float) -> bool:
-    return any(abs(angle - other) <= tolerance for other in wanted)
+def turning_point(angles: Floats) -> int:
+    """Index at which a direct spiral turns back: the later of its extreme angles."""
+    return int(max(np.argmin(angles), np.argmax(angles)))
 
 
 def spiral_indices(spiral: Spiral) -> SpiralIndices:
-    """Width and height of the loop of a spiral, simulated or from a trial.
+    """Width and height of the loop: each way changes side at another rudder.
 
-    Raises InputError if the yaw rate never changes its side, or a direct spiral does
-    not come back.
+    Raises InputError if the yaw rate never changes its side, or the spiral does not
+    come back.
     """
-    check_choice(spiral.method, ("direct", "reverse"), "spiral method")
     angles = spiral.rudder_deg
     rates = spiral.yaw_rate_deg_s
     least = rates.min()
@@ -278,18 +146,6 @@ def spiral_indices(spiral: Spiral) -> SpiralIndices:
             "spiral: expected turns to both sides, got yaw rates from"
             f" {least:.3g} to {largest:.3g} deg/s"
         )
-    if spiral.method == "direct":
-        return _direct_loop(angles, rates)
-    return _reverse_loop(angles, rates)
-
-
-def turning_point(angles: Floats) -> int:
-    """Index at which a direct spiral turns back: the later of its extreme angles."""
-    return int(max(np.argmin(angles), np.argmax(angles)))
-
-
-def _direct_loop(angles: Floats, rates: Floats) -> SpiralIndices:
-    """The loop of a direct spiral: each way changes side at another rudder."""
     turn = turning_point(angles)
     there = _ordered(angles[: turn + 1], rates[: turn + 1])
     back = _ordered(angles[turn:], rates[turn:])
@@ -338,58 +194,102 @@ def _change_of_side(way: _Curve, last: bool) -> float:
     return float(angle)
 
 
-def _reverse_loop(angles: Floats, rates: Floats) -> SpiralIndices:
-    """The fold in the curve of rudder over yaw rate."""
-    from scipy.interpolate import Akima1DInterpolator
-
-    order = np.argsort(rates)
-    interpolator = Akima1DInterpolator(rates[order], angles[order])
-    grid = np.linspace(rates.min(), rates.max(), 4001)
-    curve = np.asarray(interpolator(grid))
-
-    # where the curve has fallen most from what it had reached
-    highest = np.maximum.accumulate(curve)
-    fold = int(np.argmax(highest - curve))
-    top = float(highest[fold])
-    bottom = float(curve[fold])
-    if top == bottom:
-        return SpiralIndices(
-            loop_width_deg=0.0,
-            loop_height_deg_s=0.0,
-            loop_middle_deg=float(np.interp(0.0, grid, curve)),
-        )
-
-    middle = 0.5 * (top + bottom)
-    sides = np.sign(curve - middle)
-    crossings = np.flatnonzero(np.diff(sides))
-    return SpiralIndices(
-        loop_width_deg=top - bottom,
-        loop_height_deg_s=float(np.ptp(grid[crossings])),
-        loop_middle_deg=middle,
-    )
-
-
 def standard_spirals(
     model: ShipModel, water_depth: float = np.inf
 ) -> dict[str, Manoeuvre]:
-    """A direct spiral, and a reverse one where the ship is unstable going straight."""
+    """A direct spiral."""
     limit = model.steering.rudder_limit_deg
     angles = [angle for angle in DIRECT_RUDDER_DEG if abs(angle) <= limit]
-    spirals = {
-        "direct spiral": Manoeuvre(
-            partial(direct_spiral, rudder_deg=angles, water_depth=water_depth),
-            spiral_indices,
-            SpiralIndices,
-            "Each point a steady turn, with rudder angles there and back.",
-        )
+    sail = partial(direct_spiral, rudder_deg=angles, water_depth=water_depth)
+    caption = "Each point a steady turn, with rudder angles there and back."
+    return {
+        "direct spiral": Manoeuvre(sail, spiral_indices, SpiralIndices, caption),
     }
-    with suppress(InputError):  # there may be no straight course at all
-        if is_course_stable(model):
-            return spirals
-    spirals["reverse spiral"] = Manoeuvre(
-        partial(reverse_spiral, water_depth=water_depth),
-        spiral_indices,
-        SpiralIndices,
-        "Each point a yaw rate held by a helmsman, with the mean rudder that it took.",
+
+
+# ---- pull-outs ----------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class PullOutIndices:
+    """Indices of a pull-out."""
+
+    # yaw rate of the turn when the rudder was put amidships, degrees per second
+    turning_rate_deg_s: float
+    # yaw rate that is left at the end, degrees per second. After turns to either side
+    # it is the same for a ship that is stable on a straight course (0 where propeller
+    # and hull pull it to no side), and differs for an unstable one, unless its loop
+    # leaves out the rudder amidships
+    residual_rate_deg_s: float
+
+
+@takes_name
+def pull_out(
+    model: ShipModel,
+    rudder_deg: float = 20.0,
+    dt: float | None = None,
+    water_depth: float = np.inf,
+) -> Trial:
+    """Simulate a pull-out: a steady turn, then the rudder amidships until steady again.
+
+    The ship is at service speed and the matching shaft speed, the rudder of the turn in
+    degrees, negative to port; `dt`, the time between samples, s, is by default a
+    fortieth of the time to travel one ship length; the rest as in `zigzag`. Raises
+    InputError for a rudder of 0 or beyond the rudder's limit, UnstableModelError if the
+    ship runs away.
+    """
+    limit = model.steering.rudder_limit_deg
+    turn = turning_rudder(rudder_deg, limit, "the rudder's limit")
+    voyage = Voyage(model, dt, water_depth)
+    for angle in (turn, 0.0):
+        voyage.settle(angle, model.service_shaft_speed)
+    return voyage.trial("pull-out")
+
+
+def pull_out_indices(trial: Trial) -> PullOutIndices:
+    """Yaw rate of the turn and the yaw rate left at the end of a pull-out.
+
+    Means over the last tenth of the turn and of the time amidships. The trial has r and
+    delta (or delta_command): the same rudder in a turn, then amidships to the end.
+    Raises InputError if a channel is missing, or the rudder was never put amidships.
+    """
+    require(trial, ("r",), "a pull-out")
+    delta = np.abs(rudder(trial))
+    held = np.flatnonzero(delta > 0.5 * delta.max())
+    release = 0
+    if held.size:
+        release = int(held[-1]) + 1
+    amidships = len(trial) - release
+    if min(release, amidships) < 10:
+        raise InputError(
+            f"trial {trial.name!r}: expected a turn and then the rudder amidships, each"
+            " for at least 10 samples, got no pull-out"
+        )
+    rate = np.degrees(trial["r"])
+    return PullOutIndices(
+        turning_rate_deg_s=_last_tenth(rate[held[0] : release]),
+        residual_rate_deg_s=_last_tenth(rate[release:]),
     )
-    return spirals
+
+
+def _last_tenth(values: Floats) -> float:
+    """Mean over the last tenth of some values."""
+    count = max(len(values) // 10, 1)
+    return float(values[-count:].mean())
+
+
+def standard_pull_outs(
+    model: ShipModel, water_depth: float = np.inf
+) -> dict[str, Manoeuvre]:
+    """Pull-outs from turns to both sides."""
+    angle = min(20.0, model.steering.rudder_limit_deg)
+    caption = (
+        "Yaw rate, deg/s. Sides that end apart show a ship that is unstable on a"
+        " straight course."
+    )
+    found = {}
+    for side, sign in SIDES:
+        sail = partial(pull_out, rudder_deg=sign * angle, water_depth=water_depth)
+        name = f"pull-out from {side}"
+        found[name] = Manoeuvre(sail, pull_out_indices, PullOutIndices, caption)
+    return found

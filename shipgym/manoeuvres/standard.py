@@ -4,7 +4,6 @@ A new manoeuvre is a file and a call of `register_manoeuvre`: here, or in the fi
 itself for one of a user.
 """
 
-from shipgym.manoeuvres.pull_outs import standard_pull_outs
 from shipgym.manoeuvres.registry import (
     FAMILIES,
     Manoeuvre,
@@ -12,7 +11,7 @@ from shipgym.manoeuvres.registry import (
     register_manoeuvre,
     standard_manoeuvres,
 )
-from shipgym.manoeuvres.spirals import standard_spirals
+from shipgym.manoeuvres.spirals import standard_pull_outs, standard_spirals
 from shipgym.manoeuvres.stopping import standard_stops
 from shipgym.manoeuvres.turning import standard_circles
 from shipgym.manoeuvres.zigzags import standard_zigzags
@@ -29,4 +28,4 @@ register_manoeuvre("zigzags", standard_zigzags)
 register_manoeuvre("circles", standard_circles, "Turning circles")
 register_manoeuvre("spirals", standard_spirals)
 register_manoeuvre("pull-outs", standard_pull_outs)
-register_manoeuvre("stops", standard_stops, "Stopping and acceleration")
+register_manoeuvre("stops", standard_stops, "Stopping")

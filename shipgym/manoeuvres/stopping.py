@@ -1,4 +1,4 @@
-"""Straight-line acceleration and stopping (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
+"""Stopping (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -11,11 +11,9 @@ from shipgym.errors import InputError, ManoeuvreError
 from shipgym.manoeuvres.excitation import shaft_of
 from shipgym.manoeuvres.execution import distance_sailed, reached, require, ship_length
 from shipgym.manoeuvres.registry import Manoeuvre
-from shipgym.manoeuvres.settling import Voyage
+from shipgym.manoeuvres.voyage import Voyage
 from shipgym.models import ShipModel
 from shipgym.models.by_name import takes_name
-from shipgym.models.simulate import Conditions, Seed
-from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipEquations
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
@@ -36,23 +34,12 @@ class StoppingIndices:
     time_s: float  # s
 
 
-@dataclass(frozen=True)
-class AccelerationIndices:
-    """Indices of an acceleration."""
-
-    time_s: float  # until the given part of the change of speed is done, s
-    distance_lengths: float  # sailed by then, ship lengths
-    final_speed: float  # surge speed at the end, m/s
-
-
 def stopping(
     model: ShipModel,
     shaft_speed: float = 0.0,
     speed_ratio: float = 0.1,
     dt: float | None = None,
     water_depth: float = np.inf,
-    weather: Weather | str | None = None,
-    seed: Seed = 0,
 ) -> Trial:
     """Simulate a stop from service speed, rudder amidships, until the ship is slow.
 
@@ -73,14 +60,13 @@ def stopping(
     UnstableModelError if the ship runs away.
     """
     order = stopping_order(model, shaft_speed, speed_ratio)
-    voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
-    leg = voyage.hold(0.0, order)
+    voyage = Voyage(model, dt, water_depth)
     n_steps = max(round(voyage.length_time / voyage.dt), 2)  # of a ship length
     target = speed_ratio * model.particulars["speed"]
     column = model.state_names.index("u")
     longest = 300  # of a stopping trial, L / U0
     for stretch in range(longest):
-        states, _ = voyage.go(leg, n_steps)
+        states = voyage.hold(0.0, order, n_steps)
         is_slow = states[:, column] <= target
         if is_slow.any():
             last = stretch * n_steps + int(is_slow.argmax()) + 1
@@ -178,74 +164,6 @@ def stopping_indices(
     )
 
 
-@takes_name
-def acceleration(
-    model: ShipModel,
-    start_ratio: float = 0.25,
-    duration: float | None = None,
-    dt: float | None = None,
-    water_depth: float = np.inf,
-    weather: Weather | str | None = None,
-    seed: Seed = 0,
-) -> Trial:
-    """Simulate an acceleration from a slow speed, the shaft ordered as in service.
-
-    A helmsman keeps the yaw rate at zero, so that an unstable ship stays straight.
-
-    `start_ratio` is speed and shaft speed at the start by those at service; the
-    duration, s, is by default 40 times the time to travel one ship length; the rest as
-    in `pull_out`. Raises InputError for a ship whose propeller is not in its equations
-    or a number out of range, UnstableModelError if the ship runs away.
-    """
-    shaft_of(model)
-    check_number(
-        start_ratio,
-        "start_ratio",
-        above=0.0,
-        below=1.0,
-        hint="part of the service speed",
-    )
-    start = model.service_state.copy()
-    for name in ("u", "n"):
-        if name in model.state_names:
-            start[model.state_names.index(name)] *= start_ratio
-    voyage = Voyage(model, dt, Conditions(water_depth, weather, seed), start)
-    seconds = 40.0 * voyage.length_time if duration is None else duration
-    check_number(seconds, "duration", at_least=2.0 * voyage.dt, hint="two samples")
-    straight = voyage.rate_helmsman()(0.0)
-    voyage.go(straight, round(seconds / voyage.dt))
-    return voyage.trial("straight")
-
-
-def acceleration_indices(
-    trial: Trial, part: float = 0.9, length: float | None = None
-) -> AccelerationIndices:
-    """Time and distance that a ship needs for a part of a change of speed.
-
-    The trial has u and v, beginning with the order and ending at steady speed; `part`
-    is that of the change of surge speed from the first sample to the last, `length` as
-    in `stopping_indices`. Raises InputError if a channel or the length is missing, or
-    the ship does not become faster.
-    """
-    require(trial, ("u", "v"), "an acceleration")
-    check_number(part, "part", above=0.0, below=1.0)
-    u = trial["u"]
-    first = u[0]
-    last = u[-1]
-    if not last > first:
-        raise InputError(
-            f"trial {trial.name!r}: expected an acceleration, got u from {first:.3g} to"
-            f" {last:.3g} m/s"
-        )
-    end = _when(trial, u, first + part * (last - first))
-    sailed = np.interp(end, trial.t, distance_sailed(trial))
-    return AccelerationIndices(
-        time_s=end - float(trial.t[0]),
-        distance_lengths=float(sailed) / ship_length(trial, length),
-        final_speed=float(last),
-    )
-
-
 def _when(trial: Trial, values: Floats, threshold: float) -> float:
     """Time at which values first reach a threshold, by straight lines, s."""
     time = reached(values, threshold, trial.t)
@@ -263,7 +181,7 @@ def _when(trial: Trial, values: Floats, threshold: float) -> float:
 def standard_stops(
     model: ShipModel, water_depth: float = np.inf
 ) -> dict[str, Manoeuvre]:
-    """Inertia stop, acceleration and, if the shaft reverses, crash stop."""
+    """Inertia stop and, if the shaft reverses, crash stop."""
     if "n" not in model.command_names:
         return {}
     found = {
@@ -283,10 +201,4 @@ def standard_stops(
             "The shaft ordered full astern at service speed, the rudder amidships,"
             " until dead in the water.",
         )
-    found["acceleration"] = Manoeuvre(
-        partial(acceleration, water_depth=water_depth),
-        acceleration_indices,
-        AccelerationIndices,
-        "From a quarter of service speed, the shaft ordered to service speed.",
-    )
     return found

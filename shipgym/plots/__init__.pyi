@@ -1,4 +1,3 @@
-from .manoeuvres import excitation_figure as excitation_figure
 from .manoeuvres import manoeuvre_figure as manoeuvre_figure
 from .manoeuvres import pull_out_figure as pull_out_figure
 from .manoeuvres import speed_figure as speed_figure

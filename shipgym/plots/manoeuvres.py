@@ -8,10 +8,10 @@ import numpy as np
 
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import distance_sailed, rudder, ship_length
-from shipgym.manoeuvres.pull_outs import pull_out_indices
 from shipgym.manoeuvres.spirals import (
     Spiral,
     SpiralIndices,
+    pull_out_indices,
     spiral_indices,
     turning_point,
 )
@@ -24,7 +24,6 @@ from shipgym.manoeuvres.turning import (
 from shipgym.manoeuvres.zigzags import switch_heading_deg
 from shipgym.plots.style import (
     LIMIT,
-    MEASURED,
     MODEL,
     MUTED,
     PALETTE,
@@ -34,7 +33,7 @@ from shipgym.plots.style import (
     line,
     panels,
 )
-from shipgym.plots.trials import CHANNEL_AXES, history_figure, quantity, thinned
+from shipgym.plots.trials import CHANNEL_AXES, history_figure, thinned
 from shipgym.trials.trial import Trial
 
 
@@ -133,21 +132,14 @@ def _dimension(x: list[float], y: list[float], name: str, colour: str) -> Any:
 
 
 def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
-    """Plot yaw rate over rudder angle of a spiral; a direct one in two lines."""
+    """Plot yaw rate over rudder angle of a spiral, the ways there and back."""
     angles = spiral.rudder_deg
-    if spiral.method == "direct":
-        turn = turning_point(angles)
-        there = slice(0, turn + 1)
-        back = slice(turn, None)
-        lines = [
-            _spiral_line(spiral, there, "there", MODEL),
-            _spiral_line(spiral, back, "and back", PALETTE[1]),
-        ]
-        resolution = np.abs(np.diff(angles)).min()
-    else:
-        lines = [_spiral_line(spiral, slice(None), "reverse spiral", MODEL)]
-        resolution = 0.0
-
+    turn = turning_point(angles)
+    lines = [
+        _spiral_line(spiral, slice(0, turn + 1), "there", MODEL),
+        _spiral_line(spiral, slice(turn, None), "and back", PALETTE[1]),
+    ]
+    resolution = np.abs(np.diff(angles)).min()
     with suppress(InputError):  # a spiral with turns to one side only has no loop
         indices = spiral_indices(spiral)
         if indices.loop_width_deg > resolution:
@@ -226,53 +218,21 @@ def _release(trial: Trial) -> float:
 def speed_figure(
     trial: Trial, length: float | None = None, height: int = 380
 ) -> Figure:
-    """Plot a stop or an acceleration: speed and shaft, and speed over distance.
+    """Plot a stop: surge speed over the distance sailed and over time.
 
-    The trial has u and v, and n where the ship has a shaft; `length` as in
-    `turning_figure`.
+    The trial has u and v; `length` as in `turning_figure`.
     """
     sailed = distance_sailed(trial) / ship_length(trial, length)
     part = thinned(trial)
-    t = trial.t[part]
     u = trial["u"][part]
-    over_distance = Panel(
-        [line(sailed[part], u, "surge speed", MODEL)],
-        x="distance sailed, ship lengths",
-        y=axis(CHANNEL_AXES["u"].title, zero=True),
-    )
-    over_time = Panel(
-        [line(t, u, "surge speed", MODEL)],
-        x="time, s",
-        y=axis(zero=True),
-    )
-    shown = [over_distance, over_time]
-    shaft = quantity(trial, "n")
-    if shaft is not None:
-        shaft_over_time = Panel(
-            [line(t, shaft[part], "shaft", MEASURED)],
-            x="time, s",
-            y=axis(CHANNEL_AXES["n"].title, zero=True),
-        )
-        shown.append(shaft_over_time)
-    return panels(
-        shown,
-        height,
-        columns=len(shown),
-        grid={"horizontal_spacing": 0.09},
-        hovermode="closest",
-    )
-
-
-def excitation_figure(trial: Trial) -> Figure:
-    """Plot a manoeuvre for identification: orders above the ship's response."""
+    title = axis(CHANNEL_AXES["u"].title, zero=True)
     shown = []
-    for name in ("delta_command", "delta", "n_command", "n"):
-        if name in trial and np.ptp(trial[name]) > 0.0:
-            shown.append(name)
-    shown += ["psi", "r", "speed", "drift"]
-    figure = history_figure({"simulated": trial}, shown)
-    figure.update_layout(showlegend=False)
-    return figure
+    for x, label in (
+        (sailed[part], "distance sailed, ship lengths"),
+        (trial.t[part], "time, s"),
+    ):
+        shown.append(Panel([line(x, u, "surge speed", MODEL)], label, title))
+    return panels(shown, height, columns=2, hovermode="closest")
 
 
 def manoeuvre_figure(sailed: Trial | Spiral) -> Figure:
@@ -288,7 +248,6 @@ def manoeuvre_figure(sailed: Trial | Spiral) -> Figure:
         "zigzag": zigzag_figure,
         "turning-circle": turning_figure,
         "straight": speed_figure,
-        "random": excitation_figure,
     }
     if sailed.kind in known:
         return known[sailed.kind](sailed)

@@ -1,15 +1,13 @@
 """Indices with their intervals over the posterior, and what is judged by them."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from shipgym import InputError, load_model, manoeuvres
-from shipgym.manoeuvres import imo
-from shipgym.manoeuvres.imo import assess_draws, imo_criteria
-from shipgym.manoeuvres.intervals import IndexInterval, intervals_of, worst
+from shipgym.manoeuvres.imo import assess_draws
+from shipgym.manoeuvres.intervals import IndexInterval, intervals_of
 
 
 @pytest.fixture(scope="module")
@@ -101,58 +99,12 @@ def _only_advance(indices):
     return make_dataclass("Advance", ["advance_lengths"])(indices.advance_lengths)
 
 
-def test_the_worse_side_counts_for_each_draw():
-    none = np.zeros(2, dtype=bool)
-    one, other = (
-        IndexInterval(1.0, np.array([1.0, 4.0]), none),
-        IndexInterval(2.0, np.array([3.0, np.nan]), ~none),
-    )
-    both = worst([one, other])
-    assert both.value == 2.0
-    np.testing.assert_array_equal(both.values, [3.0, np.nan])
-    assert both.n_ran_away == 2
-
-
 def test_an_identified_ship_is_judged_with_intervals(identified):
     criteria = manoeuvres.imo_assessment(identified, n_draws=20)
     low, high = criteria["advance"].interval
     assert low < criteria["advance"].value < high < criteria["advance"].limit
     assert criteria["advance"].share_passed == 1.0
     assert criteria["tactical_diameter"].share_passed == 0.0
-
-
-@pytest.mark.parametrize(
-    ("name", "passed", "said"),
-    [
-        ("tanker", True, "up to 20"),
-        ("mariner", None, "inside its surge coefficients"),
-        ("container", None, "turning ahead only"),
-        ("kvlcc2", None, "turning ahead only"),
-    ],
-)
-def test_stopping_is_judged_where_the_ship_goes_astern(name, passed, said):
-    """Track reach of a full astern stop, MSC.137(76) 5.3.4.
-
-    The tanker's 8.95 lengths are within 15.
-    """
-    ship = load_model(name)
-    needed = {
-        n: m for n, m in manoeuvres.standard_manoeuvres(ship).items() if "stop" not in n
-    }
-    own = {n: m.no_indices for n, m in needed.items()}
-    stops = intervals_of(own, [], {})
-    if passed:
-        reach = manoeuvres.stopping_indices(
-            manoeuvres.crash_stop(ship)
-        ).track_reach_lengths
-        stops["crash stop"] = {
-            "track_reach_lengths": IndexInterval(reach, np.empty(0), np.empty(0, bool))
-        }
-        assert reach == pytest.approx(8.95, abs=0.01)
-    criterion = imo_criteria(ship, stops)["stopping"]
-    assert criterion.passed is passed
-    assert said in criterion.note
-    assert criterion.limit == 15.0
 
 
 def test_wrong_arguments(identified):
@@ -218,55 +170,3 @@ def test_an_interval_counts_all_draws_and_contains_its_estimate(
 ):
     found = index(value, draws, is_size=is_size).interval
     assert found == (interval if interval is None else pytest.approx(interval))
-
-
-def test_a_few_runaways_leave_an_upper_bound():
-    """Two of a hundred draws are beyond 97.5 per cent of them."""
-    draws = [*np.linspace(1.0, 2.0, 98), np.nan, np.nan]
-    low, high = index(1.5, draws).interval
-    assert (low, high) == (pytest.approx(1.0255, abs=1e-3), pytest.approx(1.995, 1e-3))
-    signed = index(1.5, draws, is_size=False)
-    assert signed.interval is not None
-    assert signed.quantiles(0.5) == (1.5,)
-
-
-def test_the_worst_of_two_runs_is_the_larger_draw_by_draw():
-    """One that did not finish is the worst of all."""
-    one, other = index(2.0, [1.0, 5.0, np.nan], [2]), index(3.0, [2.0, 4.0, 1.0])
-    found = worst([one, other])
-    assert found.value == 3.0
-    np.testing.assert_array_equal(found.values, [2.0, 5.0, np.nan])
-    assert found.ran_away.tolist() == [False, False, True]
-    assert worst([one, index(None, [1.0, 1.0, 1.0])]).value is None
-
-
-def test_an_identified_ship_is_judged_by_a_hundred_draws_and_another_by_none(
-    identified, monkeypatch
-):
-    drawn = []
-    monkeypatch.setattr(
-        imo, "assess_draws", lambda model, draws: drawn.append(len(draws))
-    )
-    manoeuvres.imo_assessment(identified)
-    manoeuvres.imo_assessment(load_model("mariner"))
-    manoeuvres.imo_assessment(identified, n_draws=3)
-    assert drawn == [100, 0, 3]
-    with pytest.raises(InputError, match=r"n_draws: expected .*got -1"):
-        manoeuvres.imo_assessment(identified, n_draws=-1)
-
-
-def test_progress_counts_the_draws_done(identified):
-    done = []
-    ship = load_model("mariner")
-    evaluate = {
-        "a": lambda ship: _only_advance(SimpleNamespace(advance_lengths=len(ship.name)))
-    }
-    found = intervals_of(
-        {"a": {"advance_lengths": 7.0}}, [ship, identified, ship], evaluate, done.append
-    )
-    assert done == [1, 2, 3]
-    assert found["a"]["advance_lengths"].values.tolist() == [
-        7.0,
-        len(identified.name),
-        7.0,
-    ]

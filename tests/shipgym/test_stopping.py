@@ -1,16 +1,10 @@
-"""Straight-line acceleration and stopping."""
+"""Stopping straight ahead."""
 
 import numpy as np
 import pytest
 
 from shipgym import InputError, ManoeuvreError, Trial, load_model
-from shipgym.manoeuvres import (
-    acceleration,
-    acceleration_indices,
-    stopping,
-    stopping_indices,
-)
-from shipgym.manoeuvres.stopping import stopping_order
+from shipgym.manoeuvres import stopping, stopping_indices
 
 FULL_ASTERN = -80.0 / 60.0  # 1/s
 
@@ -27,15 +21,6 @@ def test_the_tanker_stops_full_astern_in_9_lengths():
     assert indices.head_reach_lengths == pytest.approx(8.93, abs=0.01)
     assert indices.heading_change_deg == pytest.approx(32.6, abs=0.5)
     assert indices.time_s == pytest.approx(619.0, abs=2.0)
-
-
-def test_a_weaker_order_astern_takes_longer():
-    tanker = load_model("tanker")
-    reach = [
-        stopping_indices(stopping(tanker, order), 0.2).track_reach_lengths
-        for order in (0.0, -0.7, FULL_ASTERN)
-    ]
-    assert reach[0] > 1.5 * reach[1] > 2.0 * reach[2]
 
 
 def test_a_container_ship_without_thrust_halves_its_speed_in_13_lengths():
@@ -60,17 +45,6 @@ def test_coasting_straight_needs_no_sideways_room(name):
     )
 
 
-def test_full_scale_and_model_coast_alike():
-    """By Froude's law the same in ship lengths, but for the wake fraction, 0.35 against
-    0.40.
-    """
-    full, small = (
-        stopping_indices(stopping(load_model(name))).track_reach_lengths
-        for name in ("kvlcc2", "kvlcc2-l7")
-    )
-    assert small == pytest.approx(full, rel=0.01)
-
-
 def test_stopping_distance_of_a_stop_drawn_by_hand():
     """From 10 m/s at 0.1 m/s2 to the east.
 
@@ -92,30 +66,6 @@ def test_stopping_distance_of_a_stop_drawn_by_hand():
     assert half.head_reach_lengths == pytest.approx(7.5)
     assert half.side_reach_lengths == pytest.approx(0.0, abs=1e-12)
     assert half.time_s == pytest.approx(50.0)
-
-
-@pytest.mark.parametrize(
-    ("name", "lengths"),
-    [("container", 8.27), ("tanker", 15.86), ("kvlcc2", 10.28), ("kvlcc2-l7", 10.43)],
-)
-def test_acceleration_to_service_speed(name, lengths):
-    """Ship lengths from a quarter of service speed until nine tenths of the rest are
-    gained.
-    """
-    model = load_model(name)
-    trial = acceleration(model)
-    indices = acceleration_indices(trial)
-    assert indices.distance_lengths == pytest.approx(lengths, abs=0.02)
-    assert indices.final_speed == pytest.approx(model.particulars["speed"], rel=0.02)
-    assert np.ptp(trial["psi"]) < np.radians(1.5)
-
-
-def test_a_ship_without_shaft_neither_stops_nor_accelerates():
-    for call in (stopping, acceleration):
-        with pytest.raises(
-            InputError, match="'mariner': expected one that is ordered a shaft speed"
-        ):
-            call(load_model("mariner"))
 
 
 def test_a_ship_that_does_not_stop_says_so_with_its_trial():
@@ -152,59 +102,18 @@ def test_a_ship_that_does_not_stop_says_so_with_its_trial():
             lambda m: stopping(m, speed_ratio=1.5),
             "speed_ratio: expected .*got 1.5",
         ),
-        ("tanker", lambda m: acceleration(m, 0.0), "start_ratio: expected .*got 0"),
         (
-            "tanker",
-            lambda m: acceleration(m, duration=-5.0),
-            "duration: expected .*got -5",
+            "mariner",
+            stopping,
+            "'mariner': expected one that is ordered a shaft speed",
         ),
         (
             "tanker",
-            lambda m: acceleration_indices(stopping(m)),
-            "expected an acceleration",
-        ),
-        (
-            "tanker",
-            lambda m: acceleration_indices(stopping(m), 0.0),
-            "part: expected .*got 0",
-        ),
-        (
-            "tanker",
-            lambda m: acceleration_indices(stopping(m), 1.0),
-            "part: expected .*got 1",
+            lambda m: stopping_indices(Trial([0, 1, 2], {"u": [1, 1, 1.0]})),
+            "channel 'v' is missing",
         ),
     ],
 )
 def test_wrong_arguments(name, call, message):
     with pytest.raises(InputError, match=message):
         call(load_model(name))
-
-
-@pytest.mark.parametrize(
-    ("indices", "needed"),
-    [
-        (stopping_indices, ("u", "v", "x", "y", "psi")),
-        (acceleration_indices, ("u", "v")),
-    ],
-)
-def test_what_a_trial_lacks_is_named(indices, needed):
-    t = np.arange(5.0)
-    for missing in needed:
-        channels = {name: 1.0 + t for name in needed if name != missing}
-        with pytest.raises(InputError, match=f"channel '{missing}' is missing"):
-            indices(Trial(t, channels, length=50.0))
-
-
-def test_a_shaft_is_ordered_astern_by_half_as_much_again_as_ahead():
-    tanker = load_model("tanker")
-    service = tanker.service_shaft_speed
-    for share in (-1.5, -0.1, 0.0, 0.99):
-        assert stopping_order(tanker, share * service, 0.1) == share * service
-    for share in (-1.51, 1.0):
-        with pytest.raises(
-            InputError, match=r"shaft_speed: .*less than at service speed"
-        ):
-            stopping_order(tanker, share * service, 0.1)
-    assert stopping_order(tanker, -0.1, 0.0) == -0.1
-    with pytest.raises(InputError, match="never dead in the water"):
-        stopping_order(tanker, 0.0, 0.0)

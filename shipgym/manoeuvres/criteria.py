@@ -1,14 +1,16 @@
-"""Verdicts on criteria by a model, the models drawn from it, and measured trials."""
+"""Criteria of manoeuvrability, judged by measured trials and models drawn.
+
+A side of a manoeuvre counts by its trial where there is one, else by the models drawn
+from the covariance, if the manoeuvre lies within the envelope of the trials.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from shipgym.errors import ManoeuvreError, UnstableModelError
-from shipgym.manoeuvres.deciding import Remedy, remedy_for
-from shipgym.manoeuvres.evidence import Side, chances_of, worse_measured, worse_side
 from shipgym.manoeuvres.imo_rules import Rule
 from shipgym.manoeuvres.intervals import IndexInterval, worst
 from shipgym.manoeuvres.measured import MeasuredIndex, measured_indices
@@ -17,6 +19,105 @@ from shipgym.manoeuvres.stopping import StoppingIndices
 from shipgym.models.ship_model import ShipModel
 from shipgym.ships.envelope import ENVELOPE_CHANNELS
 from shipgym.trials.trial import Trial
+
+
+class Side(NamedTuple):
+    """Evidence about an index on one side."""
+
+    name: str  # "starboard" or "port"; empty of a manoeuvre without sides
+    drawn: IndexInterval
+    outside: bool = False  # whether the manoeuvre leaves the envelope of the trials
+    measured: MeasuredIndex | None = None
+
+
+class Chances(NamedTuple):
+    """Probabilities that a criterion is met and that it is missed.
+
+    What is not known counts for neither.
+    """
+
+    passes: float
+    fails: float
+
+    @property
+    def is_sure(self) -> bool:
+        """True if one of them decides."""
+        sure = 0.975
+        return max(self.passes, self.fails) >= sure
+
+
+def chances_of(sides: Sequence[Side], limit: float) -> Chances:
+    """Probabilities for the worse side: a side by its trial, else by the model.
+
+    Where the model was off on the side that was measured, it is taken to be off by as
+    much on the other.
+    """
+    passes = 1.0
+    offsets = [0.0]
+    unmeasured = []
+    for side in sides:
+        measured = side.measured
+        if measured is None:
+            unmeasured.append(side)
+            continue
+        passes *= measured.share_below(limit)
+        if side.drawn.value is not None:
+            offsets.append(measured.value - side.drawn.value)
+
+    model = _chances_by_model(unmeasured, limit, offsets)
+    holds = passes * (1.0 - model.fails)
+    return Chances(
+        passes=passes * model.passes,
+        fails=1.0 - holds,
+    )
+
+
+def _chances_by_model(
+    sides: Sequence[Side], limit: float, offsets: Sequence[float]
+) -> Chances:
+    """Probabilities by the models drawn; runaways count for neither.
+
+    `offsets`: measured by predicted index of the other side, with 0.
+    """
+    inside = [side.drawn for side in sides if not side.outside]
+    if not sides:
+        return Chances(passes=1.0, fails=0.0)
+    if not inside:
+        return Chances(passes=0.0, fails=0.0)
+    drawn = worst(inside)
+    if len(drawn.values):
+        high = drawn.values + max(offsets)
+        low = drawn.values + min(offsets)
+        meets = high <= limit
+        is_beyond = ~(low <= limit)  # or has no value
+        misses = is_beyond & ~drawn.ran_away
+        passes = float(meets.mean())
+        fails = float(misses.mean())
+    else:
+        passes = float(drawn.value is not None and drawn.value <= limit)
+        fails = 1.0 - passes
+
+    if len(inside) < len(sides):
+        passes = 0.0
+    return Chances(passes, fails)
+
+
+def worse_measured(sides: Sequence[Side]) -> MeasuredIndex | None:
+    """The largest index that trials measured; None without any."""
+    found = [side.measured for side in sides if side.measured is not None]
+    return max(found, key=lambda measured: measured.value, default=None)
+
+
+def worse_side(sides: Sequence[Side]) -> str:
+    """Name of the side whose index is largest, by trials or else by the model."""
+    measured = worse_measured(sides)
+    if measured is not None:
+        return measured.side
+    values = {}
+    for side in sides:
+        value = side.drawn.value
+        values[side.name] = np.inf if value is None else value
+    return max(values, key=lambda name: values[name])
 
 
 @dataclass(frozen=True)
@@ -44,8 +145,7 @@ class Criterion:
     side: str = ""  # the worse side: of the trials, without any of the model
     decided_by: str | None = None  # "trials", "model" or "trials and model"
     certainty: float | None = None  # of the verdict
-    #: where it is not decided: one trial that would decide it, two of which both are
-    #: needed, or none
+    #: where it is not decided: the trials that were not run, one to a side
     deciding_trials: tuple[str, ...] = ()
     sides: tuple[Side, ...] = ()  # what is known on each
 
@@ -163,13 +263,14 @@ def _source_of(criterion: Criterion, passed: bool) -> str:
 
 
 def _undecided(criterion: Criterion) -> Criterion:
-    """The criterion without verdict, with the trials that would decide it."""
-    sides = criterion.sides
-    error = criterion.measured_error
-    if error is None:
-        error = 0.2 if criterion.unit == "deg" else 0.03  # usual ones
-    remedy = remedy_for(sides, criterion.limit, error)
-    trials = [side_in_words(criterion.manoeuvre, name) for name in remedy.run]
+    """The criterion without verdict, with the trials that are left to run."""
+    left = [side.name for side in criterion.sides if side.measured is None]
+    trials = [side_in_words(criterion.manoeuvre, name) for name in left]
+    note = f"not decided by these trials: {_why_undecided(criterion)}"
+    if len(trials) == 1:
+        note += f"; run a {trials[0]}"
+    elif trials:
+        note += f"; run a {criterion.manoeuvre} to both sides"
     return replace(
         criterion,
         passed=None,
@@ -177,25 +278,8 @@ def _undecided(criterion: Criterion) -> Criterion:
         decided_by=None,
         certainty=None,
         deciding_trials=tuple(trials),
-        note=(
-            f"not decided by these trials: {_why_undecided(criterion)};"
-            f" {_in_words(remedy, criterion.manoeuvre)}"
-        ),
+        note=note,
     )
-
-
-def _in_words(remedy: Remedy, manoeuvre: str) -> str:
-    """The trials that would decide, or that no single one does."""
-    likeliest = side_in_words(manoeuvre, remedy.likeliest)
-    if len(remedy.run) == 1:
-        return f"run a {likeliest}"
-    words = "no single trial decides it"
-    if remedy.run:
-        return f"{words}, run a {manoeuvre} to both sides"
-    if remedy.share > 0.0:
-        per_cent = 100.0 * remedy.share
-        words += f" in four of five cases, a {likeliest} in {per_cent:.0f} %"
-    return words
 
 
 def side_in_words(manoeuvre: str, side: str) -> str:
