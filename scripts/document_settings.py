@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from shipgym.engine.source import keywords
 from shipgym.tasks.definition import TASKS, read_definition
-from shipgym.tasks.source import keywords
 
 FOLDER = Path(__file__).parents[1] / "docs" / "environments"
 PAGES = tuple(FOLDER / f"{name}.md" for name in ("course_keeping", "path_following"))

@@ -23,7 +23,7 @@ from shipgym.engine.mathematics import sin_cos
 from shipgym.engine.motion import Motion, Push, Ship, lost, sail
 from shipgym.engine.records import flat, leaves
 from shipgym.models.simulate import LONGEST_STEP
-from shipgym.sea.open_sea import Sea, SeaParameters, push, sea_functions
+from shipgym.sea.open_sea import OPEN_SEA, Sea, SeaParameters, push
 from shipgym.sea.weather_column import CALM, weather_column
 
 
@@ -94,7 +94,7 @@ def ship_source(
     numbers = [*model.ship_numbers(water_depth, longest), *weather]
     inputs = _inputs(model, windy=not note)
     outputs = _outputs(model)
-    c = Translator({**model.compiled.hooks(), **sea_functions(True)}, name, real)
+    c = Translator({**model.compiled.hooks(), **OPEN_SEA.functions}, name, real)
     c.structures.labels |= coefficient_labels(model)
     kind = record_kind(
         "Parameters",

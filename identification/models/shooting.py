@@ -13,8 +13,10 @@ import numpy as np
 from identification.models.segments import Segment
 from shipgym import ShipModel
 from shipgym.arrays import Floats, Integers
+from shipgym.engine.compiled_ship import STILL_WATER
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.records import LANES
+from shipgym.sea.open_sea import OPEN_SEA
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +237,9 @@ def sail_lanes(
     Numbers of the ships and states at the start, a column for each lane, and offsets of
     their rudders, rad. Shape (n_samples, n_state, LANES).
     """
-    loop = ship_loop(model.compiled, "segments", segment.has_wind)
+    loop = ship_loop(
+        model.compiled, "segments", OPEN_SEA if segment.has_wind else STILL_WATER
+    )
     n_samples = len(segment.measured)
     states = np.empty((n_samples, starts.size))
     loop(

@@ -1,11 +1,11 @@
-"""Ship as loops take her: her functions, equipment, and the layout of her numbers."""
+"""Ship and sea as loops take them: their functions, and the layout of their numbers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
-from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.motion import CALM, Motion, Push, Ship
 from shipgym.engine.record_code import loader, storer
 from shipgym.engine.records import LANES, Layout, Record, Rows
 
@@ -68,6 +68,63 @@ class CompiledShip:
             "load_ship": loader(self.layout["ship"], of_ships),
             "load_coefficients": loader(self.layout["coefficients"], of_ships),
         }
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledSea:
+    """Records and functions of a sea.
+
+    Attributes
+    ----------
+    state, parameters : Record, or pair of a Record and the paths that have a row
+        For a `Layout`.
+    functions : mapping
+        Hooks by name: `push`, `evolve`, `begin_sea`, `encounter_frequency`,
+        `add_current`, and the constant `HAS_SEA`.
+    """
+
+    state: Any
+    parameters: Any
+    functions: Mapping[str, Any]
+
+    @property
+    def windy(self) -> bool:
+        """Whether there is current, wind or waves."""
+        return bool(self.functions["HAS_SEA"])
+
+    def hooks(self, lanes: int) -> dict[str, Any]:
+        """Return the hooks that it gives; `lanes` are those of a tile of states."""
+        rows = Layout(sea=self.state)["sea"]
+        return {
+            **self.functions,
+            "load_sea": loader(rows, lanes),
+            "store_sea": storer(rows, lanes),
+            "load_sea_parameters": loader(Layout(sea=self.parameters)["sea"], 1),
+        }
+
+
+class NoNumbers(NamedTuple):
+    """State and parameters of still water."""
+
+    unused: float
+
+
+def no_push(motion: Motion, sea: Any, p: Any) -> Push:
+    """Still water pushes nobody."""
+    return CALM
+
+
+def unchanged(motion: Motion, h: float, sea: Any, word: Any, p: Any) -> Any:
+    """Still water stays so."""
+    return sea
+
+
+#: Water of a loop that knows no sea.
+STILL_WATER = CompiledSea(
+    state=(NoNumbers, ()),
+    parameters=(NoNumbers, ()),
+    functions={"HAS_SEA": False, "push": no_push, "evolve": unchanged},
+)
 
 
 @cache

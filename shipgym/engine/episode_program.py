@@ -6,7 +6,8 @@ from functools import cache, cached_property
 from typing import Any
 
 from shipgym.engine import episodes, sailing, stages, tiles
-from shipgym.engine.compiled_ship import CompiledShip
+from shipgym.engine.annotations import ObservationSpec
+from shipgym.engine.compiled_ship import CompiledSea, CompiledShip
 from shipgym.engine.compiling import compiled, plain_python
 from shipgym.engine.envelope import Envelope
 from shipgym.engine.extra_arguments import completed
@@ -14,6 +15,7 @@ from shipgym.engine.lane_records import (
     Commands,
     EpisodeCounters,
     Outcome,
+    Random,
     Rules,
     SeaRandom,
 )
@@ -21,10 +23,6 @@ from shipgym.engine.memory import Arguments
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.record_code import clipped_storer, loader, storer, summed, zeros
 from shipgym.engine.records import LANES, Layout
-from shipgym.instruments.sensor_set import SensorSet
-from shipgym.sea import open_sea
-from shipgym.tasks.contract import ObservationSpec, Random
-from shipgym.tasks.definition import TaskDefinition
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,24 +32,20 @@ class EpisodeProgram:
     Attributes
     ----------
     ship : CompiledShip
-    task : TaskDefinition
-    sensors : SensorSet
-    windy : bool
-        Whether there is current, wind or waves.
+    sea : CompiledSea
+    task : shipgym.tasks.definition.TaskDefinition
+    sensors : shipgym.instruments.sensor_set.SensorSet
     shared : bool
         Whether all lanes have the same ship and sea.
-    shared_settings : bool
-        Whether all lanes have the same settings of the task.
     current : callable or None
         `current(x, y, settings)`, of a current that differs from place to place.
     """
 
     ship: CompiledShip
-    task: TaskDefinition
-    sensors: SensorSet
-    windy: bool
+    sea: CompiledSea
+    task: Any
+    sensors: Any
     shared: bool
-    shared_settings: bool = True
     current: Any = None
 
     @cached_property
@@ -59,7 +53,7 @@ class EpisodeProgram:
         """Rows of a tile of states; behind them the plan of an episode."""
         return Layout(
             motion=(Motion, self.ship.state_names),
-            sea=open_sea.sea_records(self.windy)[0],
+            sea=self.sea.state,
             commands=Commands,
             counters=EpisodeCounters,
             memory=self.sensors.Memory,
@@ -74,7 +68,6 @@ class EpisodeProgram:
             reward=self.task.Reward,
             reported=(self.task.State, self.task.reported),
             observation=self.task.Observation,
-            goals=self._goals,
             **(stages.BETWEEN_STAGES if self.ship.staged else {}),
         )
 
@@ -85,16 +78,9 @@ class EpisodeProgram:
             ship=Ship,
             coefficients=self.ship.coefficients,
             envelope=Envelope,
-            sea_parameters=open_sea.sea_records(self.windy)[1],
+            sea_parameters=self.sea.parameters,
             scale=self.task.Observation,
-            goal_scale=self._goals,
         )
-
-    @property
-    def _goals(self) -> Any:
-        """Record of goals for a `Layout`; no rows where the task has none."""
-        record = self.task.goals_record
-        return record if self.task.has_goals else (record, ())
 
     @cached_property
     def random_rows(self) -> Layout:
@@ -125,7 +111,7 @@ class EpisodeProgram:
         part = name.removeprefix("reward_")
         if name in self.task.reported:
             return rows["reported"].row(name)
-        if name in Outcome._fields or part in self.task.parts_of_engine:
+        if name in Outcome._fields or part == "end":
             return rows["outcome"].row(part)
         parts = self.task.reward_names
         return rows["reward"].first + parts.index(part)
@@ -134,11 +120,9 @@ class EpisodeProgram:
     def hooks(self) -> dict[str, Any]:
         """Functions and values for the hooks and constants of loops, by name."""
         of_ships = 1 if self.shared else LANES
-        of_settings = 1 if self.shared_settings else LANES
         return {
             "GROUP": 1 if plain_python() else tiles.GROUP,
             "SHARED_SHIP": self.shared,
-            "SHARED_SETTINGS": self.shared_settings,
             "PLAN_ROW": self.state_rows.n_rows,
             **_loaders(self.state_rows, LANES),
             **_storers(self.state_rows, LANES),
@@ -148,7 +132,7 @@ class EpisodeProgram:
             **_storers(self.random_rows, LANES),
             **_loaders(self.ship_rows, of_ships),
             **_loaders(self.settings_rows, 1),
-            **_loaders(self.task_settings_rows, of_settings),
+            **_loaders(self.task_settings_rows, 1),
             **_loaders(Layout(arguments=Arguments), 1),
             **self._task_hooks(),
             "measure": self.sensors.measure,
@@ -158,7 +142,7 @@ class EpisodeProgram:
             "sail_lanes": sailing.sail_in_one_loop,
             **self.ship.hooks(shared=self.shared),
             **self.ship.staged,
-            **open_sea.sea_functions(self.windy),
+            **self.sea.functions,
             "CURRENT_BY_PLACE": self.current is not None,
             **({} if self.current is None else {"current_at": self.current}),
         }
@@ -170,7 +154,6 @@ class EpisodeProgram:
             "task_begin": task.begin,
             "task_step": completed(task.step),
             "observe": completed(task.observe),
-            "goals_of": task.goals_of,
             "due": completed(task.due),
             "on_event": task.on_event,
             "worst_cost": task.worst_cost,
@@ -179,10 +162,6 @@ class EpisodeProgram:
             "store_observation": clipped_storer(
                 self.result_rows["observation"],
                 bounds_of(task.observations),
-            ),
-            "store_goals": clipped_storer(
-                self.result_rows["goals"],
-                bounds_of(task.goals),
             ),
         }
 

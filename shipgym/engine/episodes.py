@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from shipgym.engine.hooks import (
+    add_current,
     begin_sea,
     current_at,
     load_arguments,
@@ -39,7 +40,7 @@ from shipgym.engine.judging import (
     store_task,
     take_events,
 )
-from shipgym.engine.lane_records import Commands, SeaRandom
+from shipgym.engine.lane_records import Commands, Random, SeaRandom
 from shipgym.engine.mathematics import pick
 from shipgym.engine.memory import bool_in, float32_in, int64_row_in
 from shipgym.engine.motion import CURRENT_BY_PLACE, HAS_SEA, Motion
@@ -57,8 +58,6 @@ from shipgym.engine.tiles import (
     tile_of,
     write_outputs,
 )
-from shipgym.sea.open_sea import add_current
-from shipgym.tasks.contract import Random
 
 SIGNATURE = "int64(float64[::1], float64[::1], int64, int64)"
 STEP, STEP_AND_BEGIN, BEGIN, BEGIN_NEXT, OBSERVE = range(
@@ -170,7 +169,7 @@ def begin_lane(tile: Tile, lane: int) -> None:
     clear_lane(state, lane)
     clear_lane(tile.result, lane)
 
-    settings = settings_of(tile, lane)
+    settings = settings_of(tile)
     ship = load_ship(tile.ships, lane)
     plan = plan_of(state, lane)
     motion, task_state = task_begin(ship, settings.task, random, plan)
@@ -199,7 +198,7 @@ def begin_sea_of(tile: Tile, lane: int, motion: Motion, random: Random) -> None:
     parameters = load_sea_parameters(tile.ships, lane)
     sea = begin_sea(motion, word, parameters)
     if CURRENT_BY_PLACE:
-        settings = load_task_settings(tile.task_settings, lane)
+        settings = load_task_settings(tile.task_settings, 0)
         here = current_at(motion.x, motion.y, settings)
         sea = add_current(sea, here[0], here[1])
     store_sea(tile.state, lane, sea)

@@ -2,19 +2,19 @@
 
 `step`, `observe`, `due` and `reward` have five arguments, and may name `EXTRAS` behind
 them. Loops call them with tile and lane behind the five. Each is therefore wrapped by
-one of the functions here, which take from tile and lane what it names, and nothing
-else: a loop is not slower for what a task does not use.
+a function that takes from tile and lane what it names, and nothing else: a loop is not
+slower for what a task does not use.
 """
 
 from collections.abc import Sequence
 from functools import cache
-from types import FunctionType
 from typing import Any
 
 from shipgym.engine.hooks import load_random
+from shipgym.engine.lane_records import Random
 from shipgym.engine.random import interval_key
+from shipgym.engine.record_code import written
 from shipgym.engine.tiles import Tile, plan_of
-from shipgym.tasks.contract import Random
 
 #: Arguments that a function may name behind the required ones, in any order.
 EXTRAS = ("random", "plan")
@@ -37,79 +37,10 @@ def plan_to_read(tile: Tile, lane: int) -> Any:
     return plan_of(tile.state, lane)
 
 
-def wrapped_function(*arguments: Any, **extras: Any) -> Any:
-    """Hook: the function that is wrapped."""
-    raise NotImplementedError("filled by `completed`")
-
-
-def with_nothing(
-    moment: Any,
-    state: Any,
-    interval: Any,
-    ship: Any,
-    settings: Any,
-    tile: Tile,
-    lane: int,
-) -> Any:
-    """Call a function that names no extras."""
-    return wrapped_function(moment, state, interval, ship, settings)
-
-
-def with_random(
-    moment: Any,
-    state: Any,
-    interval: Any,
-    ship: Any,
-    settings: Any,
-    tile: Tile,
-    lane: int,
-) -> Any:
-    """Call a function that names random numbers."""
-    random = random_of(tile, lane, interval.steps)
-    return wrapped_function(moment, state, interval, ship, settings, random)
-
-
-def with_plan(
-    moment: Any,
-    state: Any,
-    interval: Any,
-    ship: Any,
-    settings: Any,
-    tile: Tile,
-    lane: int,
-) -> Any:
-    """Call a function that names the plan."""
-    plan = plan_to_read(tile, lane)
-    return wrapped_function(moment, state, interval, ship, settings, plan)
-
-
-def with_both(
-    moment: Any,
-    state: Any,
-    interval: Any,
-    ship: Any,
-    settings: Any,
-    tile: Tile,
-    lane: int,
-) -> Any:
-    """Call a function that names both, in either order."""
-    return wrapped_function(
-        moment,
-        state,
-        interval,
-        ship,
-        settings,
-        random=random_of(tile, lane, interval.steps),
-        plan=plan_to_read(tile, lane),
-    )
-
-
-_WRAPPERS = {
-    (): with_nothing,
-    ("random",): with_random,
-    ("plan",): with_plan,
-    ("random", "plan"): with_both,
-    ("plan", "random"): with_both,
+#: Source that takes each from tile and lane.
+_TAKEN = {
+    "random": "random_of(tile, lane, interval.steps)",
+    "plan": "plan_to_read(tile, lane)",
 }
 
 
@@ -122,9 +53,15 @@ def completed(function: Any) -> Any:
     extras = arguments[required:]
     if extras == ("tile", "lane"):  # one of the package's
         return function
-    wrapper = _WRAPPERS[extras]
-    hooks = {**wrapper.__globals__, "wrapped_function": function}
-    return FunctionType(wrapper.__code__, hooks, wrapper.__name__)
+    given = "moment, state, interval, ship, settings"
+    taken = ", ".join([given, *(f"{name}={_TAKEN[name]}" for name in extras)])
+    names = {
+        "random_of": random_of,
+        "plan_to_read": plan_to_read,
+        "wrapped_function": function,
+    }
+    body = [f"return wrapped_function({taken})"]
+    return written("completed", f"{given}, tile, lane", body, names)
 
 
 def innermost(function: Any) -> Any:

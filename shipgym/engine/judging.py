@@ -12,11 +12,9 @@ from shipgym.engine.envelope import Envelope, envelope_distance, outside_range
 from shipgym.engine.hooks import (
     due,
     encounter_frequency,
-    goals_of,
     load_commands,
     load_counters,
     load_envelope,
-    load_goal_scale,
     load_memory,
     load_motion,
     load_outcome,
@@ -35,7 +33,6 @@ from shipgym.engine.hooks import (
     on_event,
     readings,
     store_counters,
-    store_goals,
     store_memory,
     store_observation,
     store_outcome,
@@ -46,19 +43,17 @@ from shipgym.engine.hooks import (
     total_reward,
     worst_cost,
 )
-from shipgym.engine.lane_records import EpisodeCounters, Outcome, Rules
+from shipgym.engine.lane_records import EpisodeCounters, Interval, Outcome, Rules
 from shipgym.engine.mathematics import pick
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.specialise import called
 from shipgym.engine.tiles import (
     FIRST_LANE,
     GROUP,
-    SHARED_SETTINGS,
     SHARED_SHIP,
     Tile,
     plan_of,
 )
-from shipgym.tasks.contract import Interval
 
 
 class LaneView(NamedTuple):
@@ -86,12 +81,12 @@ def view_of(tile: Tile, lane: int) -> LaneView:
     )
 
 
-def settings_of(tile: Tile, lane: int) -> AllSettings:
-    """Return the settings of a lane."""
+def settings_of(tile: Tile) -> AllSettings:
+    """Return the settings, which all lanes share."""
     return AllSettings(
         rules=load_rules(tile.settings),
         sensors=load_sensor_settings(tile.settings),
-        task=load_task_settings(tile.task_settings, lane),
+        task=load_task_settings(tile.task_settings, 0),
     )
 
 
@@ -103,13 +98,12 @@ def conclude_lanes(tile: Tile, groups: int) -> tuple[int, int]:
     just ended; lanes beyond them, up to so many groups, fill vectors.
     """
     state = tile.state
-    first_settings = settings_of(tile, FIRST_LANE)
+    settings = settings_of(tile)
     shared = view_of(tile, FIRST_LANE)
     n_due = 0
     n_ended = 0
     for lane in range(groups * GROUP):
         ship, data, scale = shared if SHARED_SHIP else view_of(tile, lane)
-        settings = first_settings if SHARED_SETTINGS else settings_of(tile, lane)
         motion = load_motion(state, lane)
         over = load_counters(state, lane).ended != 0.0
         interval = past_interval(tile, lane, motion, data, settings.rules)
@@ -123,8 +117,6 @@ def conclude_lanes(tile: Tile, groups: int) -> tuple[int, int]:
             seen, task_state, interval, ship, settings.task, tile, lane
         )
         store_observation(tile.result, lane, observation, scale)
-        goals = goals_of(motion, task_state, interval, ship, settings.task, tile, lane)
-        store_goals(tile.result, lane, goals, load_goal_scale(tile.ships, lane))
 
         is_due = due(motion, task_state, interval, ship, settings.task, tile, lane)
         goes_on = not (over | just_ended)
@@ -224,7 +216,6 @@ def outcome_of(
         extrapolating=interval.extrapolating,
         end=end,
         cost=-(earned + end),
-        goal=0.0,
     )
 
 
@@ -274,7 +265,7 @@ def take_events(tile: Tile) -> None:
     """Take events, such as a new set-point, in the lanes in which one is due."""
     state = tile.state
     for lane in range(tile.lanes):
-        settings = load_task_settings(tile.task_settings, lane)
+        settings = load_task_settings(tile.task_settings, 0)
         ship = load_ship(tile.ships, lane)
         motion = load_motion(state, lane)
         before = load_task_state(state, lane)
@@ -313,10 +304,8 @@ def observe_lane(tile: Tile, lane: int) -> None:
     task_state = load_task_state(state, lane)
 
     ship, _, scale = view_of(tile, lane)
-    settings = load_task_settings(tile.task_settings, lane)
+    settings = load_task_settings(tile.task_settings, 0)
     interval = last_interval(tile, lane)
     seen = readings(motion, sea, memory)
     observation = observe(seen, task_state, interval, ship, settings, tile, lane)
     store_observation(tile.result, lane, observation, scale)
-    goals = goals_of(motion, task_state, interval, ship, settings, tile, lane)
-    store_goals(tile.result, lane, goals, load_goal_scale(tile.ships, lane))

@@ -41,7 +41,6 @@ class Outcome(NamedTuple):
     extrapolating: float  # 1 or 0
     end: float  # part of the reward: the rest of an episode that failed
     cost: float  # minus the sum of all parts
-    goal: float  # part of the reward of a task with goals, which is added afterwards
 
 
 class SeaRandom(NamedTuple):
@@ -96,3 +95,44 @@ class SeaChannels(NamedTuple):
     current_east: float  # m/s
     wind_speed: float  # m/s
     wind_from: float  # rad
+
+
+class Random(NamedTuple):
+    """Key of the random numbers of one episode.
+
+    Each number is a function of the key, the episode and its own number alone.
+    """
+
+    key: Any  # uint64
+    episode: Any  # uint64
+
+
+class Interval(NamedTuple):
+    """Control interval that is over."""
+
+    dt: float  # s
+    steps: float  # control intervals so far
+    rudder_before: float  # rad, rudder at its beginning
+    rudder_command: float  # part of the limit
+    shaft_command: float  # part of the shaft speed at service speed
+    # distance from the training data (`Envelope.distance`)
+    envelope_distance: float
+    extrapolating: float  # 1 where the ship was outside that data
+
+
+class Readings(NamedTuple):
+    """The readings of the ship's instruments."""
+
+    x: float  # m, north
+    y: float  # m, east
+    psi: float  # rad
+    u: float  # m/s, through the water
+    v: float  # m/s
+    r: float  # rad/s
+    p: float  # rad/s
+    phi: float  # rad
+    delta: float  # rad
+    n: float  # 1/s
+    track_psi: float  # rad, heading to which the velocity over ground is referred
+    ahead: float  # m/s, over ground, ahead
+    aside: float  # m/s, over ground, to starboard

@@ -6,13 +6,12 @@ from functools import cache
 from typing import Any
 
 from shipgym.engine import batches, steered, trajectories
-from shipgym.engine.compiled_ship import CompiledShip
+from shipgym.engine.compiled_ship import STILL_WATER, CompiledSea, CompiledShip
 from shipgym.engine.compiling import compiled
 from shipgym.engine.lane_records import Inputs, SeaChannels, WindAccelerations
 from shipgym.engine.record_code import loader, storer
 from shipgym.engine.records import LANES, Layout, Rows
 from shipgym.engine.trajectories import SEA_CHANNELS
-from shipgym.sea.open_sea import sea_hooks
 
 VECTOR = "float64[::1]"
 TABLE = "float64[:, ::1]"
@@ -65,18 +64,18 @@ LOOPS = {
 
 
 @cache
-def ship_loop(ship: CompiledShip, name: str, windy: bool = False) -> Any:
-    """Compile a loop of `LOOPS` for a ship in calm water or in the open sea."""
+def ship_loop(ship: CompiledShip, name: str, sea: CompiledSea = STILL_WATER) -> Any:
+    """Compile a loop of `LOOPS` for a ship, by default in still water."""
     loop = LOOPS[name]
     channels = Rows(SeaChannels, len(ship.state_names), SEA_CHANNELS)
     hooks = {
         **ship.hooks(loop.lanes, loop.shared),
-        **sea_hooks(windy, loop.lanes),
+        **sea.hooks(loop.lanes),
         "store_sea_channels": storer(channels, 1),
         "load_inputs": loader(Layout(inputs=Inputs)["inputs"], 1),
         "load_wind": loader(Layout(wind=WindAccelerations)["wind"], 1),
         **loop.hooks,
     }
-    where = "in the open sea" if windy else "in calm water"
+    where = "in the open sea" if sea.windy else "in calm water"
     what = f"{ship.name} {where}: {name}"
     return compiled(loop.function, loop.signature, hooks, what)

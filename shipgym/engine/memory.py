@@ -36,8 +36,7 @@ class Arguments(NamedTuple):
     ships: Block
     pool: Block  # float64 (1, n_pool * n_ship_rows), of which each episode draws one
     settings: Block  # float64 (1, n): of engine and sensor set
-    # float64 (n_tiles, n_settings * 64), or (1, n_settings) where all share them
-    task_settings: Block
+    task_settings: Block  # float64 (1, n)
     results: Block  # float64 (n_shares, n_result_rows * 64): room for those of a tile
     # int64 (n_shares, 2): first tile of a thread, and that behind its last
     shares: Block

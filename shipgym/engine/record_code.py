@@ -68,7 +68,7 @@ def loader(rows: Rows, lanes: int = LANES) -> Function:
     made = _constructed(rows.record, "", number, names)
     name = f"load_{rows.record.__name__}"
     arguments = "array, lane" if lanes > 1 else "array, lane=0"
-    return _function(name, arguments, [f"return {made}"], names)
+    return written(name, arguments, [f"return {made}"], names)
 
 
 def storer(rows: Rows, lanes: int = LANES) -> Function:
@@ -79,7 +79,7 @@ def storer(rows: Rows, lanes: int = LANES) -> Function:
         entry = _entry(row, lanes, names)
         lines.append(f"{entry} = {_part('record', path)}")
     name = f"store_{rows.record.__name__}"
-    return _function(name, "array, lane, record", lines, names)
+    return written(name, "array, lane, record", lines, names)
 
 
 def clipped_storer(rows: Rows, bounds: Mapping[str, tuple[float, float]]) -> Function:
@@ -96,21 +96,21 @@ def clipped_storer(rows: Rows, bounds: Mapping[str, tuple[float, float]]) -> Fun
         at_least = f"max({scaled}, {float(low)!r})"
         lines.append(f"{entry} = min({at_least}, {float(high)!r})")
     name = f"store_{rows.record.__name__}"
-    return _function(name, "array, lane, record, scale", lines, names)
+    return written(name, "array, lane, record, scale", lines, names)
 
 
 def zeros(record: Record) -> Function:
     """Write `none()`, a record of zeros."""
     names: dict[str, Any] = {}
     made = _constructed(record, "", lambda path, kind: "0.0", names)
-    return _function(f"no_{record.__name__}", "", [f"return {made}"], names)
+    return written(f"no_{record.__name__}", "", [f"return {made}"], names)
 
 
 def summed(record: Record) -> Function:
     """Write `total(record)`, the sum of its numbers, one after another."""
     terms = [_part("record", path) for path in leaves(record)]
     body = [f"return {' + '.join(terms)}"]
-    return _function(f"total_{record.__name__}", "record", body, {})
+    return written(f"total_{record.__name__}", "record", body, {})
 
 
 def _part(record: str, path: str) -> str:
@@ -158,7 +158,7 @@ def _class_name(record: Record, names: dict[str, Any]) -> str:
     return called
 
 
-def _function(
+def written(
     name: str,
     arguments: str,
     body: list[str],

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from shipgym.engine.hooks import (
+    add_current,
     current_at,
     evolve,
     load_coefficients,
@@ -44,7 +45,6 @@ from shipgym.engine.motion import (
 from shipgym.engine.random import EVOLVE_WORDS
 from shipgym.engine.specialise import called
 from shipgym.engine.tiles import FIRST_LANE, GROUP, SHARED_SHIP, Tile
-from shipgym.sea.open_sea import Sea, add_current
 
 
 def are_finite(actions: Any) -> bool:
@@ -156,7 +156,7 @@ def in_local_water(
     She is carried along like the water she displaces; where she moves through it into
     water of another speed, hers over ground stays.
     """
-    settings = load_task_settings(tile.task_settings, lane)
+    settings = load_task_settings(tile.task_settings, 0)
     sea = load_sea(tile.state, lane)
     drifted_x = before.x + h * sea.current_north
     drifted_y = before.y + h * sea.current_east
@@ -172,12 +172,12 @@ def evolved_sea(
     h: float,
     word: Any,
     parameters: Any,
-) -> Sea:
+) -> Any:
     """Return the sea h seconds later, with the current where the ship is then."""
     sea = load_sea(tile.state, lane)
     if not CURRENT_BY_PLACE:
         return evolve(motion, h, sea, word, parameters)
-    settings = load_task_settings(tile.task_settings, lane)
+    settings = load_task_settings(tile.task_settings, 0)
     before = load_motion(tile.state, lane)
     left = current_at(before.x, before.y, settings)
     met = current_at(motion.x, motion.y, settings)

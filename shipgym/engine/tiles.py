@@ -25,8 +25,6 @@ FIRST_LANE: Any = np.int64(0)
 PLAN_ROW = 0  # first row of the plans of episodes
 # whether all lanes have the same ship, which is then read before a loop and not in it
 SHARED_SHIP = True
-# whether they have the same settings of the task, likewise
-SHARED_SETTINGS = True
 
 
 class Tile(NamedTuple):
@@ -39,8 +37,7 @@ class Tile(NamedTuple):
     ships: Any
     pool: Any  # float64 (n_pool * n_ship_rows,), of which each episode draws a ship
     settings: Any  # float64: of the engine and the sensor set
-    # float64 (n_settings * 64,), or (n_settings,) where all lanes share them
-    task_settings: Any
+    task_settings: Any  # float64 (n_settings,)
     first: int  # number of its first ship
     lanes: int  # how many ships there are
 
@@ -67,7 +64,7 @@ def tile_of(memory: Any, at: Arguments, share: int, number: int) -> Tile:
         ships=row_in(memory, at.ships, number % at.ships.rows),
         pool=row_in(memory, at.pool, 0),
         settings=row_in(memory, at.settings, 0),
-        task_settings=row_in(memory, at.task_settings, number % at.task_settings.rows),
+        task_settings=row_in(memory, at.task_settings, 0),
         first=first,
         lanes=min(at.actions.columns - first, LANES),
     )

@@ -1,6 +1,6 @@
 """Conformance suite for vector environments; Gymnasium's checker takes single ones."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import closing
 from typing import Any
 
@@ -136,7 +136,7 @@ def _check_steps(env: Vectors, n_steps: int) -> None:
                 np.array_equal(before, copy),
                 "step changed an array that an earlier step had returned",
             )
-        arrays = (*parts_of(observations), rewards, terminated, truncated)
+        arrays = (observations, rewards, terminated, truncated)
         kept = [(array, np.copy(array)) for array in arrays]
 
 
@@ -209,28 +209,14 @@ def _rollout(env: Vectors, seed: Any, n_steps: int) -> Episode:
     env.action_space.seed(SEED)
     observations, _ = env.reset(seed=seed)
     nothing = np.zeros(env.num_envs)
-    episode: Episode = [(as_rows(observations), nothing, nothing, nothing)]
+    episode: Episode = [(observations, nothing, nothing, nothing)]
     for _ in range(n_steps):
         action = env.action_space.sample()
         observations, rewards, terminated, truncated, _ = env.step(action)
-        episode.append((as_rows(observations), rewards, terminated, truncated))
+        episode.append((observations, rewards, terminated, truncated))
         if not goes_on and np.any(terminated | truncated):
             break
     return episode
-
-
-def parts_of(observations: Any) -> list[Any]:
-    """Arrays of observations, several in a dictionary space."""
-    if isinstance(observations, Mapping):
-        return [observations[name] for name in sorted(observations)]
-    return [observations]
-
-
-def as_rows(observations: Any) -> Any:
-    """Observations as one array, also those of a dictionary space."""
-    if isinstance(observations, Mapping):
-        return np.concatenate(parts_of(observations), axis=-1)
-    return observations
 
 
 def _same(one: Episode, other: Episode) -> bool:
@@ -313,10 +299,10 @@ def _check_partial_reset(
     before: Any,
     done: Flags,
 ) -> None:
-    kept = np.copy(as_rows(before))
+    kept = np.copy(before)
     seen, _ = env.reset(options={"reset_mask": done.copy()})
     _check_observations(env, seen, "reset with a mask")
-    after = as_rows(seen)
+    after = seen
     _expect(
         np.array_equal(after[~done], kept[~done]),
         "reset with a mask changed rows outside of it",

@@ -16,7 +16,6 @@ from shipgym.engine.compiling import entry_of
 from shipgym.engine.episode_program import EpisodeProgram, episode_program
 from shipgym.engine.episodes import BEGIN, BEGIN_NEXT, OBSERVE, STEP, STEP_AND_BEGIN
 from shipgym.engine.records import LANES
-from shipgym.envs.goals import Goals
 from shipgym.envs.lanes import Contents, Lanes
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES
 from shipgym.envs.plain_python import plain_loop
@@ -24,6 +23,7 @@ from shipgym.envs.randomisation import Pool, Randomisation
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.python_files import asked
+from shipgym.sea.open_sea import CALM_SEA, OPEN_SEA
 from shipgym.tasks.task import Task, course_keeping_task
 
 Observation = NDArray[np.float32]
@@ -50,12 +50,8 @@ class Engine(Lanes):
         Whether a model that was found unstable when it was identified may be used.
     threads : int
         Number of threads that share the lanes; the results do not depend on it.
-    model_index : int, optional
-        Number of the ship, of those that are drawn from, that all episodes have.
     loop : callable, optional
         Makes the loop that steps the ships; by default it is compiled.
-    lane_settings : sequence of NamedTuple, optional
-        Settings of the task in each lane, in place of the task's.
     scale_task : Task, optional
         Task that gives the scales of observations; by default `task`.
     """
@@ -68,9 +64,7 @@ class Engine(Lanes):
         randomisation: Randomisation | None = None,
         allow_unstable: bool = False,
         threads: int = 1,
-        model_index: int | None = None,
         loop: Callable[[EpisodeProgram], Any] | None = None,
-        lane_settings: Sequence[Any] | None = None,
         scale_task: Task | None = None,
     ) -> None:
         check_whole(num_envs, "num_envs", at_least=1)
@@ -80,7 +74,6 @@ class Engine(Lanes):
         model = ships[0]
         task = task or course_keeping_task()
         task.check_fits(model)
-        settings = lane_settings or [task.settings]
         scale_task = scale_task or task
 
         self.rebuild: Callable[..., Engine] = partial(
@@ -96,8 +89,6 @@ class Engine(Lanes):
         self.pool = randomisation.ships(model, task.seas)
         drawn = len(self.pool) > 1
         windy = _any_weather(self.pool, task)
-        if model_index is not None:
-            self.pool = _only(model_index, self.pool)
         own = [(ship, task.seas[0]) for ship in ships]
         if drawn:
             if len(ships) > 1:
@@ -108,25 +99,17 @@ class Engine(Lanes):
 
         program = episode_program(
             model.compiled,
+            OPEN_SEA if windy else CALM_SEA,
             task.definition,
             task.instruments(windy),
-            windy,
             len(own) == 1,
-            len(settings) == 1,
             task.current,
         )
-        contents = Contents(own, drawn, settings, scale_task)
+        contents = Contents(own, drawn, scale_task)
         super().__init__(program, model, task, num_envs, contents, threads)
-        self._watch(scale_task)
+        # other ships are looked after behind each step
+        self._is_watched = bool(task.definition.targets)
         self._begin_all(loop or self._compiled)
-
-    def _watch(self, scale_task: Task) -> None:
-        """Prepare what is done after steps of a task with goals or other ships."""
-        task = self.task
-        self.goals: Goals | None = None
-        if task.definition.has_goals:
-            self.goals = Goals(task, self.model, scale_task, self.task_settings)
-        self._is_watched = bool(self.goals or task.definition.targets)
 
     def _begin_all(self, loop: Callable[[EpisodeProgram], Any]) -> None:
         """Begin an episode in each lane, with the loop of the program."""
@@ -222,35 +205,11 @@ class Engine(Lanes):
         return partial(self._watched, step) if self._is_watched else step
 
     def _watched(self, step: Callable[[], int]) -> int:
-        """Take a step of a task with goals, or other ships, and look after both."""
-        over = self.read("ended") > 0.0
+        """Take a step of a task with other ships, and look after them."""
         n_ended = step()
-        if n_ended < 0:
-            return n_ended
-        if self.task.definition.targets:
+        if n_ended >= 0:
             self.refuse_lost_targets()
-        if self.goals is not None:
-            self._reward_goals(self.goals, over)
         return n_ended
-
-    def _reward_goals(self, goals: Goals, over: Flags) -> None:
-        """Add the rewards of goals in lanes that had not ended.
-
-        A lost ship is charged for the intervals of `Task.end_intervals`.
-        """
-        task = self.task
-        end = self.info("reward_end")
-        left = np.maximum(task.episode_steps - self.steps, 1.0)
-        end *= np.minimum(task.end_intervals / left, 1.0)
-
-        outputs = self.outputs
-        earned = goals.of_rows(outputs.observations)
-        earned[over] = 0.0
-        parts = {name: self.info(name) for name in task.reward_parts}
-        parts["reward_goal"][:] = earned
-        rewards = goals.sum_of_others(parts) + earned
-        outputs.outcomes[0] = rewards
-        self.info("cost")[:] = -rewards
 
     def reset(self, seeds: ArrayLike) -> Observation:
         """Begin in each lane the episode of the single environment's `reset(seed=...)`.
@@ -385,13 +344,6 @@ def _any_weather(pool: Pool, task: Task) -> bool:
     if task.current is not None:
         return True
     return any(not sea.calm for _, sea in pool)
-
-
-def _only(model_index: int, pool: Pool) -> Pool:
-    """Pool of which each episode has the same ship; InputError for another number."""
-    last = len(pool) - 1
-    check_whole(model_index, "model_index", at_least=0, at_most=last)
-    return [pool[model_index]] * len(pool)
 
 
 def _check_ships(

@@ -23,9 +23,7 @@ from shipgym.checks import (
     unexpected,
 )
 from shipgym.envs.engine import Engine, as_array, episode_key
-from shipgym.envs.goals import Goals, box_of
 from shipgym.envs.randomisation import Randomisation
-from shipgym.envs.row_settings import parted, row_settings
 from shipgym.errors import InputError
 from shipgym.instruments.sensor_set import read_sensors
 from shipgym.models import ShipModel, load_model
@@ -89,9 +87,14 @@ def read_options(
     return ship, Task.of(definition, **rest), randomisation
 
 
-def spaces(task: Task, model: ShipModel, goals: Goals | None) -> tuple[Any, Space]:
+def spaces(task: Task, model: ShipModel) -> tuple[Any, Space]:
     """Observation and action space of a task for a ship."""
-    observations = goals.space() if goals else box_of(task.observed(model))
+    observed = task.observed(model)
+    observations = gymnasium.spaces.Box(
+        low=np.array([quantity.low for quantity in observed], dtype=np.float32),
+        high=np.array([quantity.high for quantity in observed], dtype=np.float32),
+        dtype=np.float32,
+    )
     counts = [len(orders) for orders in task.orders(model)]
     if len(counts) == 1:
         return observations, gymnasium.spaces.Discrete(counts[0])
@@ -158,8 +161,6 @@ class ShipsEnv:
     observation_names : tuple of str
     observation_scales : array of shape (n_observations,)
         Physical value of an observation of 1, SI units.
-    compute_reward : callable
-        Of a task with goals alone (`shipgym.envs.goals.Goals.compute_reward`).
     render_mode : str or None
     """
 
@@ -214,10 +215,7 @@ class ShipsEnv:
         self._begun = False  # and not closed since
         self._keys: NDArray[np.uint64] | None = None  # of each row's episodes
         self._use(self._own_engine)
-        self._goals = self._own_engine.goals
-        if self._goals:  # by having it an environment says that it has goals
-            self.compute_reward = self._goals.compute_reward
-        return spaces(self.task, self.model, self._goals)
+        return spaces(self.task, self.model)
 
     @property
     def corridor(self) -> float | None:
@@ -228,10 +226,6 @@ class ShipsEnv:
     def turn_radius(self) -> float | None:
         """Radius of the turns of the path, m; None where it has none."""
         return self._engine.path_metres("turn_radius")
-
-    def _shown(self, rows: NDArray[np.float32]) -> Any:
-        """Observations as they are returned: an array, or a dictionary with goals."""
-        return rows if self._goals is None else self._goals.split(rows)
 
     def _made(self) -> None:
         """End the construction: attributes that are added later are the user's."""
@@ -302,7 +296,7 @@ class ShipsEnv:
                 raise unexpected(f"state: {name}", expected, state[name])
 
         settings = self.task.definition.settings
-        asked = check_table(state["asked"], "state: asked", [*settings, "model_index"])
+        asked = check_table(state["asked"], "state: asked", settings)
         engine = self._engine_for(asked)
         engine.set_state(state["engine"])
         # nothing is refused from here on
@@ -322,15 +316,7 @@ class ShipsEnv:
         own = self._own_engine
         if not asked:
             return own
-        given = dict(asked)
-        model_index = given.pop("model_index", None)
-        shared, by_row = parted(self.task.definition, given, own.num_envs)
-        task = self.task.changed(**shared) if shared else self.task
-        return own.rebuild(
-            task=task,
-            model_index=model_index,
-            lane_settings=row_settings(task, self.model, by_row, own.num_envs),
-        )
+        return own.rebuild(task=self.task.changed(**asked))
 
     def _take(self, options: Mapping[str, Any] | None, *more: str) -> Any:
         """Apply the options of a reset until the next one; return a state among them.
@@ -341,7 +327,7 @@ class ShipsEnv:
         for name, value in (options or {}).items():
             if value is not None:
                 asked[name] = value
-        known = [*self.task.definition.settings, "model_index", "state", *more]
+        known = [*self.task.definition.settings, "state", *more]
         check_keys(asked, known, "options")
 
         state = asked.pop("state", None)

@@ -31,7 +31,6 @@ class Contents(NamedTuple):
     # one ship and sea for all lanes or one each, or the pool
     own: Pool
     drawn: bool  # whether each episode draws a ship and a sea of a pool
-    settings: Sequence[Any]  # of the task, one for all lanes or one each
     scale_task: Task  # that gives the scales of observations
 
 
@@ -66,7 +65,7 @@ class Lanes:
         self.model = model
         self.task = task
         self.num_envs = num_envs
-        self.windy = program.windy
+        self.windy = program.sea.windy
         self.dt = task.interval(model)
         self.flag_names = [name for name in task.info_names if name in task.flags]
         self._output_pool = self._pool_of_outputs()
@@ -84,34 +83,31 @@ class Lanes:
         self._states = tables["states"]
         self._random = lanes_of(tables["random"])
         self._ships = tables["ships"]
-        self.task_settings = tables["task_settings"]
         self._actions = tables["actions"]
         self._chosen = tables["chosen"][0]
 
     def _pool_of_outputs(self) -> OutputPool:
         """Make the pool of the arrays that steps return."""
         task = self.task
-        n_goals = len(task.goals(self.model))
         return OutputPool(
             self.num_envs,
-            n_observed=len(task.observed(self.model)) + n_goals,
+            n_observed=len(task.observed(self.model)),
             n_outcomes=ANSWER_OUTCOMES + len(task.info_names),
             n_flags=ANSWER_FLAGS + len(self.flag_names),
         )
 
     def _filled_tables(self, contents: Contents, n_tiles: int) -> dict[str, Floats]:
         """Tables of ships, of their pool, and of settings of the task."""
-        own, drawn, settings, scale_task = contents
+        own, drawn, scale_task = contents
         columns = ship_columns(
             own, self.windy, self.task, self.model, drawn, scale_task
         )
         n_ship_rows = columns.shape[1]
         pool = columns if drawn else np.zeros((0, n_ship_rows))
-        of_task = np.array([flat(one) for one in settings])
         return {
             "ships": ship_tiles(columns, n_tiles, len(own) > 1),
             "pool": pool.reshape(1, -1),
-            "task_settings": ship_tiles(of_task, n_tiles, len(settings) > 1),
+            "task_settings": np.array([flat(self.task.settings)]),
         }
 
     def _empty_tables(self, n_tiles: int) -> dict[str, NDArray[Any]]:
@@ -173,8 +169,6 @@ class Lanes:
         observed = []
         for quantity in self.task.observed(self.model):
             observed.append(rows["observation"].row(quantity.path))
-        for goal in self.task.goals(self.model):
-            observed.append(rows["goals"].row(goal.path))
         outcomes = ("reward", "terminated", "truncated")
         answer = [rows["outcome"].row(name) for name in outcomes]
         info = [self.program.info_row(name) for name in self.task.info_names]
@@ -302,14 +296,8 @@ class Lanes:
             hooks["load_motion"](states, lane_in_tile),
             hooks["load_task_state"](states, lane_in_tile),
             hooks["load_ship"](ships, lane_in_tile),
-            self.settings_of(lane),
+            self.task.settings,
         )
-
-    def settings_of(self, lane: int) -> Any:
-        """Settings of the task in a lane."""
-        tile, lane_in_tile = divmod(lane, LANES)
-        settings = self.task_settings[tile % len(self.task_settings)]
-        return self.program.hooks["load_task_settings"](settings, lane_in_tile)
 
     def refuse_lost_targets(self) -> None:
         """Refuse numbers of other ships that are not finite.
@@ -476,7 +464,6 @@ def ship_columns(
 
         ship = Ship(*numbers[: len(Ship._fields)].tolist())
         factors = _scale_factors(scale_task, ship, task.definition.observations)
-        factors += _scale_factors(scale_task, ship, task.definition.goals)
         envelope = envelope_numbers(model)
         columns.append([*numbers, *envelope, *sea_parameters, *factors])
     return np.stack(columns)

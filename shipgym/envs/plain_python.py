@@ -33,7 +33,6 @@ def plain_loop(
         "task_begin": (Motion, task.State),
         "task_step": (task.State, task.Reward, bool, bool),
         "observe": task.Observation,
-        "goals_of": task.goals_record,
         "due": bool,
         "on_event": task.State,
         "worst_cost": float,
@@ -54,8 +53,7 @@ def _checked(program: EpisodeProgram, name: str, form: Any) -> Callable[..., Any
     function = specialisation.copy(program.hooks[name])
     # of a task with another's reward, the function that differs from its own step
     names = function.__globals__
-    reward = names.get("reward_of_another") or names.get("achieved_of_task")
-    reward = reward or names.get("current_of_file")
+    reward = names.get("reward_of_another") or names.get("current_of_file")
     return partial(_result_of, function, reward, form)
 
 

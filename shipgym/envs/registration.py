@@ -79,10 +79,10 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     **options
         Keywords of the environment that differ from their defaults.
     """
+    from shipgym.engine.source import kept_source
     from shipgym.envs.engine import fault_in_python
     from shipgym.envs.environment import DEFAULT_MODEL, read_options
     from shipgym.envs.ship_env import ShipEnv
-    from shipgym.tasks.source import kept_source
     from shipgym.tasks.task import ENV_OPTIONS
 
     given = {"task": kept_source(task), **options}

@@ -6,7 +6,6 @@ from shipgym.arrays import Floats
 
 #: Attributes that all rows share, by the names of the single environment.
 SHARED = (
-    "compute_reward",
     "corridor",
     "dt",
     "metadata",

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from shipgym.arrays import Flags
 from shipgym.checks import check_choice
-from shipgym.envs.row_settings import options_of_rows
 from shipgym.envs.rows import FIXED, Row
 from shipgym.envs.ship_vector_env import Infos, ShipVectorEnv
 from shipgym.errors import InputError
@@ -101,12 +100,15 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         """Begin an episode in each row: the next, or by the seeds of `seed`, once.
 
         Options of `set_options` are those of the native environment's `reset`, the same
-        in all rows or settings of the task by row. Episodes that begin by themselves
+        in all rows. Episodes that begin by themselves
         keep them, until the next `reset`. Raises InputError as that does.
         """
-        given = self._options
+        options, *others = self._options
         self._reset_options()
-        options = options_of_rows(self._ships.task, given, self.num_envs)
+        if any(other != options for other in others):
+            raise InputError(
+                "options: expected the same for all rows, got several dictionaries"
+            )
 
         # `seed` sets those of all rows, or there are none
         seeds = None if None in self._seeds else self._seeds

@@ -117,8 +117,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             Fixes this episode and all that follow it.
         options : dict, optional
             Until the next reset: settings of the task by their names, such as
-            `waypoints` of the path, or of several; `model_index`, the one of the ships
-            that episodes are drawn from. Or, alone, `state`: go on from what
+            `waypoints` of the path, or of several. Or, alone, `state`: go on from what
             `get_state` gave. Observations keep the scales of the environment.
 
         Returns
@@ -141,7 +140,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             self._engine.begin(self._keys, episodes)
             self._draw_and_show()
         numbers = self._outcomes[ANSWER_OUTCOMES:].tolist()
-        return self._shown(self._observation.copy()), self._info(numbers)
+        return self._observation.copy(), self._info(numbers)
 
     def step(
         self, action: Any
@@ -187,10 +186,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             terminated, truncated = self._end
         elif terminated or truncated:
             self._note_end((terminated, truncated))
-        observation: Any = self._observation.copy()
-        if self._goals is not None:
-            observation = self._goals.split(observation)
-        return observation, reward, terminated > 0.0, truncated > 0.0, info
+        return self._observation.copy(), reward, terminated > 0.0, truncated > 0.0, info
 
     def _note_end(self, end: Any = (0.0, 0.0)) -> None:
         """Note how an episode ended, terminated or truncated; neither: it goes on."""

@@ -133,8 +133,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             next episodes begin.
         options : dict, optional
             `reset_mask`, bool array of shape (num_envs,): rows in which an episode is
-            to begin, the others go on. Or those of the single environment, a setting
-            being the same for all rows or an array with an entry for each.
+            to begin, the others go on. Or those of the single environment, for all
+            rows.
 
         Returns
         -------
@@ -162,7 +162,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         infos = self._infos()
         for name in self._masks:
             infos[name] = mask.copy()
-        return self._shown(engine.outputs.observations), infos
+        return engine.outputs.observations, infos
 
     def _next_episodes(
         self,
@@ -264,7 +264,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             self._over = outputs.terminated | outputs.truncated
         self._draw()
         return (
-            self._shown(outputs.observations),
+            outputs.observations,
             rewards,
             outputs.terminated,
             outputs.truncated,
@@ -285,7 +285,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         ended = outputs.terminated | outputs.truncated
         final_obs = np.full(self.num_envs, None, dtype=object)
         for row in np.flatnonzero(ended).tolist():
-            final_obs[row] = self._shown(outputs.observations[row].copy())
+            final_obs[row] = outputs.observations[row].copy()
 
         # zero in the rows that go on, as in Gymnasium's vector environments
         outcomes = np.where(ended, outputs.outcomes, 0.0)

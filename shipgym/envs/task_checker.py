@@ -175,10 +175,9 @@ def _numbers(
 
 
 def _seen_names(engine: Engine) -> list[str]:
-    """Names of the columns of the observations, goals among them."""
+    """Names of the columns of the observations."""
     task = engine.task
-    observed = [f"Observation.{one.path}" for one in task.observed(engine.model)]
-    return observed + [f"Goal: {one.path}" for one in task.goals(engine.model)]
+    return [f"Observation.{one.path}" for one in task.observed(engine.model)]
 
 
 def _source_of(name: str, task: Task) -> str:

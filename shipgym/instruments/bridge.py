@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shipgym.engine.lane_records import Interval, Random, Readings
 from shipgym.engine.mathematics import clip, pick, sin_cos
 from shipgym.engine.motion import Motion, ground_velocity
 from shipgym.engine.random import DRAW, mix, normal, rng_state
 from shipgym.sea.open_sea import Sea
-from shipgym.tasks.contract import Interval, Random, Readings
 
 #: Random numbers of the instruments, apart from those of task and weather.
 INSTRUMENTS_STREAM = np.uint64(0xE7037ED1A0B428DB)

@@ -2,9 +2,9 @@
 
 from typing import NamedTuple
 
+from shipgym.engine.lane_records import Interval, Random, Readings
 from shipgym.engine.motion import Motion, ground_velocity
 from shipgym.sea.open_sea import Sea
-from shipgym.tasks.contract import Interval, Random, Readings
 
 
 class Settings(NamedTuple):

@@ -6,8 +6,8 @@ from functools import cache
 from typing import Any
 
 from shipgym.engine.records import Record
+from shipgym.engine.source import Configurable, check_namespace, read_source
 from shipgym.instruments import perfect
-from shipgym.tasks.source import Configurable, check_namespace, read_source
 
 #: Functions of a sensor set with their arguments, as `perfect` explains them.
 FUNCTIONS = {

@@ -8,13 +8,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole, unexpected
+from shipgym.engine.compiled_ship import STILL_WATER
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.records import leaves
 from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.sea.conditions import Weather, as_weather
 from shipgym.sea.current_field import CurrentField
-from shipgym.sea.open_sea import Sea
+from shipgym.sea.open_sea import OPEN_SEA, Sea
 from shipgym.sea.weather_column import weather_column
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.orders import checked_orders, two_commands
@@ -68,7 +69,7 @@ class Passage:
 
     def loop(self, name: str) -> Any:
         """Loop of `shipgym.engine.loops` for the ship in calm water or weather."""
-        return ship_loop(self.compiled, name, self.windy)
+        return ship_loop(self.compiled, name, OPEN_SEA if self.windy else STILL_WATER)
 
     def run(
         self, name: str, states: Floats, *arguments: Any, since: float = 0.0
@@ -170,7 +171,9 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     wind = wind_accelerations(trial, model.dynamics)
     mean_wind = 0.5 * (wind[1:] + wind[:-1])
 
-    loop = ship_loop(model.compiled, "open_loop", bool(mean_wind.any()))
+    loop = ship_loop(
+        model.compiled, "open_loop", OPEN_SEA if mean_wind.any() else STILL_WATER
+    )
     reached = loop(
         states,
         t,

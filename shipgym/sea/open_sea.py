@@ -13,11 +13,10 @@ already divided by the ship's inertia.
 from math import fabs, pi, sqrt
 from typing import Any, NamedTuple
 
+from shipgym.engine.compiled_ship import CompiledSea
 from shipgym.engine.mathematics import sin_cos
 from shipgym.engine.motion import HAS_ROLL, HAS_SEA, Motion, Push
 from shipgym.engine.random import DRAW, S11, TO_UNIT, mix, normal
-from shipgym.engine.record_code import loader, storer
-from shipgym.engine.records import LANES, Layout
 from shipgym.sea.filters import (
     Filter,
     Oscillator,
@@ -386,36 +385,13 @@ def add_current(sea: Sea, north: float, east: float) -> Sea:
     )
 
 
-def sea_records(windy: bool) -> tuple[Any, Any]:
-    """State and parameters of the sea for a `Layout`.
-
-    Calm water takes no rows, and is read as zeros.
-    """
-    return (Sea, SeaParameters) if windy else ((Sea, ()), (SeaParameters, ()))
-
-
-def sea_functions(windy: bool) -> dict[str, Any]:
-    """Return the functions of the sea that fill hooks, by name."""
-    return {
-        "HAS_SEA": windy,
-        "push": push,
-        "evolve": evolve,
-        "begin_sea": begin_sea,
-        "encounter_frequency": encounter_frequency,
-    }
-
-
-def sea_hooks(windy: bool, lanes: int = LANES) -> dict[str, Any]:
-    """Return `sea_functions`, and those that load state and parameters of all ships.
-
-    `lanes` are those of a tile of states, 64, or 1 where they are vectors.
-    """
-    sea, parameters = sea_records(windy)
-    state_rows = Layout(sea=sea)["sea"]
-    parameter_rows = Layout(parameters=parameters)["parameters"]
-    return {
-        **sea_functions(windy),
-        "load_sea": loader(state_rows, lanes),
-        "store_sea": storer(state_rows, lanes),
-        "load_sea_parameters": loader(parameter_rows, 1),
-    }
+_FUNCTIONS = {
+    "push": push,
+    "evolve": evolve,
+    "begin_sea": begin_sea,
+    "encounter_frequency": encounter_frequency,
+    "add_current": add_current,
+}
+OPEN_SEA = CompiledSea(Sea, SeaParameters, {"HAS_SEA": True, **_FUNCTIONS})
+#: Its records take no rows and are read as zeros.
+CALM_SEA = CompiledSea((Sea, ()), (SeaParameters, ()), {"HAS_SEA": False, **_FUNCTIONS})

@@ -32,7 +32,6 @@ and may define
 * `check(settings, model)`: raises `InputError` for settings that do not fit, first
   without a ship, `model` None, then with one; `listed(value)`: what a keyword of
   another kind, such as a list of waypoints, means as numbers.
-* `Goal`, `achieved`, `desired` and `goal_reward`: goals (`shipgym.tasks.goals`).
 * `current(x, y, settings) -> (north, east)`: a current by place, m/s.
 * `draw(motion, state, ship, settings)`: shapes for pictures (`shipgym.tasks.shapes`).
 
@@ -63,35 +62,21 @@ those of `shipgym.engine.mathematics`, and choose by `pick` or a conditional exp
 The other functions are called ship by ship and may do what Numba can.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.engine.annotations import (
+    NO_NUMBERS,
+    Flag,
+    Numbers,
+    ObservationSpec,
+    Scale,
+    Setting,
+)
+from shipgym.engine.lane_records import Interval, Random, Readings
 from shipgym.engine.mathematics import arctan2, clip, pick, sin_cos, wrap
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.random import GOLDEN, NORMAL, episode_word, normal, uniform
 from shipgym.engine.records import Size
-
-#: A last field of `Settings` that holds any number of numbers, and its default, none.
-Numbers = NDArray[np.float64]
-NO_NUMBERS: Numbers = np.zeros(0)
-#: A field of `State` that is a boolean, 1 or 0.
-Flag = Annotated[float, bool]
-#: Physical value of an observation of 1, or how it follows from ship and settings.
-Scale = float | Callable[[Ship, Any], float]
-
-
-class Random(NamedTuple):
-    """Key of the random numbers of one episode.
-
-    Each number is a function of the key, the episode and its own number alone.
-    """
-
-    key: Any  # uint64
-    episode: Any  # uint64
 
 
 def drawn(random: Random, number: int, low: float, high: float) -> float:
@@ -103,82 +88,6 @@ def drawn_normal(random: Random, number: int) -> float:
     """Draw the normally distributed random number that has a number, of variance 1."""
     word = episode_word(random.key, random.episode) ^ NORMAL
     return normal(word, np.uint64(number) * GOLDEN)
-
-
-class Interval(NamedTuple):
-    """Control interval that is over."""
-
-    dt: float  # s
-    steps: float  # control intervals so far
-    rudder_before: float  # rad, rudder at its beginning
-    rudder_command: float  # part of the limit
-    shaft_command: float  # part of the shaft speed at service speed
-    # distance from the training data (`Envelope.distance`)
-    envelope_distance: float
-    extrapolating: float  # 1 where the ship was outside that data
-
-
-class Readings(NamedTuple):
-    """The readings of the ship's instruments."""
-
-    x: float  # m, north
-    y: float  # m, east
-    psi: float  # rad
-    u: float  # m/s, through the water
-    v: float  # m/s
-    r: float  # rad/s
-    p: float  # rad/s
-    phi: float  # rad
-    delta: float  # rad
-    n: float  # 1/s
-    track_psi: float  # rad, heading to which the velocity over ground is referred
-    ahead: float  # m/s, over ground, ahead
-    aside: float  # m/s, over ground, to starboard
-
-
-@dataclass(frozen=True)
-class ObservationSpec:
-    """Bounds, unit and scale of an observation.
-
-    Attributes
-    ----------
-    low, high : float
-        Bounds of the observation.
-    unit : str
-        Unit of the quantity.
-    scale : float or callable
-        Physical value of an observation of 1, or `(ship, settings) -> float`.
-    option : str
-        `roll`, `shaft` or `shaft speed`, which the observation is made for; by default
-        it is always made.
-    """
-
-    low: float
-    high: float
-    unit: str = "-"
-    scale: Scale = 1.0
-    option: str = ""
-
-
-@dataclass(frozen=True)
-class Setting:
-    """Bounds of a setting.
-
-    Attributes
-    ----------
-    about : str
-        Its meaning, a sentence.
-    at_least, at_most, above : float or None
-        Its bounds.
-    whole : bool
-        Whether it is an integer.
-    """
-
-    about: str
-    at_least: float | None = None
-    at_most: float | None = None
-    above: float | None = None
-    whole: bool = False
 
 
 def under_way(x: float, y: float, psi: float, speed: float, shaft: float) -> Motion:

@@ -30,12 +30,7 @@ from shipgym.engine.records import (
     members,
     short_names,
 )
-from shipgym.engine.specialise import is_shipped
-from shipgym.errors import InputError
-from shipgym.python_files import asked, check_function
-from shipgym.tasks.contract import ObservationSpec
-from shipgym.tasks.goals import check_goal_names, goals_function, goals_record
-from shipgym.tasks.source import (
+from shipgym.engine.source import (
     Configurable,
     annotated,
     check_namespace,
@@ -43,6 +38,10 @@ from shipgym.tasks.source import (
     keywords,
     read_source,
 )
+from shipgym.engine.specialise import is_shipped
+from shipgym.errors import InputError
+from shipgym.python_files import asked, check_function
+from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.traffic import targets_of
 
 RECORDS = ("Settings", "State", "Reward", "Observation")
@@ -55,9 +54,6 @@ FUNCTIONS = {
     "on_event": (*MOMENT, "random", "plan"),
     "worst_cost": ("settings",),
     "plan_length": ("settings",),
-    "achieved": MOMENT,
-    "desired": MOMENT,
-    "goal_reward": ("achieved", "desired", "settings"),
     "current": ("x", "y", "settings"),
     "draw": ("motion", "state", "ship", "settings"),
     "check": ("settings", "model"),
@@ -126,8 +122,6 @@ class TaskDefinition(Configurable):
     Settings, State, Reward, Observation : type
     begin, step, observe : callable
     due, on_event, worst_cost, plan_length, check, listed : callable
-    Goal, achieved, desired, goal_reward : type and callables, or None
-        Of a task with goals (`shipgym.tasks.goals`).
     current : callable or None
         Current by place, `current(x, y, settings) -> (north, east)`, m/s.
     draw : callable or None
@@ -152,10 +146,6 @@ class TaskDefinition(Configurable):
     listed: Callable[[Any], Any] = np.asarray
     reported: tuple[str, ...] = ()
     episode_steps: int = 600
-    Goal: Record | None = None
-    achieved: Callable[..., Any] | None = None
-    desired: Callable[..., Any] | None = None
-    goal_reward: Callable[..., Any] | None = None
     current: Callable[..., Any] | None = None
     draw: Callable[..., Any] | None = None
 
@@ -163,31 +153,6 @@ class TaskDefinition(Configurable):
     def targets(self) -> tuple[str, ...]:
         """Equations of the other ships that a step sails (`shipgym.tasks.traffic`)."""
         return tuple(targets_of(self.step))
-
-    @property
-    def has_goals(self) -> bool:
-        """True where what is achieved and desired are observed."""
-        return self.Goal is not None
-
-    @property
-    def parts_of_engine(self) -> tuple[str, ...]:
-        """Names of the parts of the reward that the engine adds."""
-        return ("end", "goal") if self.has_goals else ("end",)
-
-    @property
-    def goals_record(self) -> Record:
-        """Record of the goals that are achieved and desired."""
-        return goals_record(self.Goal)
-
-    @property
-    def goals_of(self) -> Any:
-        """Function that makes the goals of the task."""
-        return goals_function(self.Goal, self.achieved, self.desired)
-
-    @cached_property
-    def goals(self) -> dict[str, ObservationSpec]:
-        """Bounds, unit and scale of each number of the goals, by its path."""
-        return _observations(self.goals_record) if self.has_goals else {}
 
     @cached_property
     def observations(self) -> dict[str, ObservationSpec]:
@@ -297,10 +262,6 @@ def _definition(source: Any) -> TaskDefinition:
     for path, spec in definition.observations.items():
         place = field_place(definition.Observation, path.partition(".")[0], where)
         _check_observation(spec, f"{place}: Observation.{path}")
-    for path, spec in definition.goals.items():
-        field = path.removeprefix("achieved.").removeprefix("desired.")
-        place = field_place(definition.Goal, field.partition(".")[0], where)
-        _check_observation(spec, f"{place}: Goal.{field}")
     _check_names(definition)
     return definition
 
@@ -308,7 +269,7 @@ def _definition(source: Any) -> TaskDefinition:
 def _definition_of(namespace: Any, where: str) -> TaskDefinition:
     """Return the definition in a namespace, with defaults for absent names."""
     found = {}
-    for name in (*RECORDS, "Goal", *FUNCTIONS):
+    for name in (*RECORDS, *FUNCTIONS):
         if hasattr(namespace, name):
             found[name] = getattr(namespace, name)
     return TaskDefinition(
@@ -326,7 +287,7 @@ def _check_task(namespace: Any, where: str) -> None:
     check_namespace(
         namespace,
         where,
-        records=(*RECORDS, "Goal") if check_goal_names(namespace, where) else RECORDS,
+        records=RECORDS,
         functions=FUNCTIONS,
         optional=[name for name in FUNCTIONS if name not in needed],
     )
@@ -378,7 +339,7 @@ def _check_names(definition: TaskDefinition) -> None:
         definition.Reward,
         rewards,
         definition.reward_source,
-        taken=definition.parts_of_engine,
+        taken=("end",),
     )
     settings = [name for name, *_ in keywords(definition.Settings)]
     _check_differ(definition.Settings, dict(enumerate(settings)), source)

@@ -42,7 +42,7 @@ RUDDER_ORDERS = (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 1.0)
 #: engine telegraph; those astern only where the propeller is known astern.
 _SHAFT_ORDERS = (-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
 #: Options of a reset that are not settings of the task.
-_RESET_OPTIONS = ("model_index", "state", "reset_mask")
+_RESET_OPTIONS = ("state", "reset_mask")
 
 
 class Observed(NamedTuple):
@@ -143,12 +143,6 @@ class Task:
                 "bounded",
                 above=0.0,
                 hint="or True or False",
-            )
-        if self.definition.has_goals and self.options.get("bounded"):
-            source = self.definition.source
-            raise InputError(
-                f"bounded: expected none with the goals of {source}, whose reward"
-                f" compute_reward gives, got {self.bounded!r}; leave it out"
             )
         if self.loss_horizon is not None:
             check_number(self.loss_horizon, "loss_horizon", at_least=0.0)
@@ -301,11 +295,8 @@ class Task:
 
         source = self.definition.source
         asked(self.definition.check, self.settings, model)
-        for quantity in (*self.observed(model), *self.goals(model)):
-            record = (
-                "Goals" if quantity.path in self.definition.goals else "Observation"
-            )
-            where = f"{source}: {record}.{quantity.path}: scale for {model.name!r}"
+        for quantity in self.observed(model):
+            where = f"{source}: Observation.{quantity.path}: scale for {model.name!r}"
             check_number(quantity.scale, where, above=0.0)
         length = asked(self.definition.plan_length, self.settings)
         check_whole(length, f"{source}: plan_length", at_least=0)
@@ -334,22 +325,6 @@ class Task:
             )
             observed.append(quantity)
         return tuple(observed)
-
-    def goals(self, model: ShipModel) -> tuple[Observed, ...]:
-        """Numbers of the goals achieved and desired, in order; none without goals."""
-        ship = ship_of(model, self.water_depth)
-        quantities = []
-        for path, spec in self.definition.goals.items():
-            kind, _, name = path.partition(".")
-            quantity = Observed(
-                name=f"{kind}_goal.{name}",
-                low=spec.low,
-                high=spec.high,
-                scale=self.scale_of(spec, ship),
-                path=path,
-            )
-            quantities.append(quantity)
-        return tuple(quantities)
 
     def instruments(self, windy: bool) -> SensorSet:
         """Sensor set of the ship, in weather or in calm water."""
@@ -383,12 +358,7 @@ class Task:
 
     @property
     def half_reward_cost(self) -> float:
-        """Cost of a step that earns half of a bounded reward; 0 for minus the cost.
-
-        The reward of a task with goals is minus the cost.
-        """
-        if self.definition.has_goals:
-            return 0.0
+        """Cost of a step that earns half of a bounded reward; 0 for minus the cost."""
         if isinstance(self.bounded, bool):
             return HALF_REWARD_COST if self.bounded else 0.0
         return float(self.bounded)
@@ -419,7 +389,7 @@ class Task:
     def reward_parts(self) -> tuple[str, ...]:
         """Names of the parts of the reward among them."""
         definition = self.definition
-        parts = (*definition.reward_names, *definition.parts_of_engine)
+        parts = (*definition.reward_names, "end")
         return tuple(f"reward_{name}" for name in parts)
 
     def __getattr__(self, name: str) -> Any:

@@ -41,7 +41,7 @@ from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError
 from shipgym.models import load_model
 from shipgym.sea import Current, Weather, Wind
-from shipgym.sea.open_sea import sea_functions
+from shipgym.sea.open_sea import OPEN_SEA
 from shipgym.sea.weather_column import CALM
 from shipgym.ships.kernel_boxes import Kernel, kernel_box
 from shipgym.tasks.task import path_following_task
@@ -132,7 +132,7 @@ def kernel_ship():
 @pytest.mark.parametrize("name", ["tanker", "kvlcc2-rm-svm", "kernel"])
 def test_every_kind_of_ship_is_the_same_in_c_as_in_plain_python(name, tmp_path):
     model = kernel_ship() if name == "kernel" else load_model(name)
-    hooks = {**model.compiled.hooks(), **sea_functions(True)}
+    hooks = {**model.compiled.hooks(), **OPEN_SEA.functions}
     plain = Specialisation(hooks).copy(advance)
     numbers = model.ship_numbers()
     ship = hooks["load_ship"](numbers, 0)

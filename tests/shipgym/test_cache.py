@@ -24,6 +24,7 @@ from shipgym.engine.compiling import compiled
 from shipgym.engine.episode_program import EpisodeProgram
 from shipgym.errors import InputError
 from shipgym.instruments.sensor_set import shipped_sensors
+from shipgym.sea.open_sea import CALM_SEA, OPEN_SEA
 from shipgym.tasks.definition import read_definition
 
 VECTOR = r"<\d+ x double>"  # as LLVM writes it
@@ -356,7 +357,8 @@ def test_who_waits_sees_one_line(
 def test_loops_over_ships_are_vectorised(folder, task, windy):
     ship = shipgym.load_model("mariner-tls-svm").compiled
     sensors = shipped_sensors(windy, False, False)
-    program = EpisodeProgram(ship, read_definition(task), sensors, windy, shared=True)
+    sea = OPEN_SEA if windy else CALM_SEA
+    program = EpisodeProgram(ship, sea, read_definition(task), sensors, shared=True)
     (code,) = program.run.inspect_llvm().values()
     counts = [
         [

@@ -18,9 +18,7 @@ from numba.experimental import jitclass
 from numba.extending import intrinsic
 
 import shipgym
-from shipgym.engine import hooks
 from shipgym.engine.compiling import compiled
-from shipgym.engine.episode_program import EpisodeProgram
 from shipgym.engine.fingerprint import fingerprint
 from shipgym.engine.loops import LOOPS, ship_loop
 from shipgym.engine.numba_errors import explanation
@@ -28,12 +26,10 @@ from shipgym.engine.record_code import clipped_storer, loader, storer, summed, z
 from shipgym.engine.records import Layout, row_of, table_of
 from shipgym.engine.specialise import Specialisation, called, named_globals
 from shipgym.errors import InputError
-from shipgym.instruments.sensor_set import shipped_sensors
 from shipgym.models.catalogue import kvlcc2, kvlcc2_l7
-from shipgym.sea.open_sea import sea_hooks
+from shipgym.sea.open_sea import CALM_SEA, OPEN_SEA
 from shipgym.ships.term_functions import accelerations_source
 from shipgym.ships.terms import Term
-from shipgym.tasks.definition import read_definition
 
 SAIL = """
 import numpy as np, shipgym
@@ -77,39 +73,6 @@ def test_importing_shipgym_leaves_the_heavy_libraries_alone():
     ]
     code = f"import shipgym, sys; print([n for n in {heavy!r} if n in sys.modules])"
     assert run(code) == "[]"
-
-
-@pytest.mark.parametrize("ship", ["mariner", "kvlcc2-rm-svm"])
-def test_every_hook_is_filled_with_a_function_of_its_arguments(ship):
-    program = EpisodeProgram(
-        shipgym.load_model(ship).compiled,
-        read_definition("CourseKeeping"),
-        shipped_sensors(True, True, True),
-        windy=True,
-        shared=True,
-    )
-    asked = {
-        name: function
-        for name, function in vars(hooks).items()
-        if isinstance(function, FunctionType) and function.__module__ == hooks.__name__
-    }
-    of_trials = {"store_sea_channels", "load_inputs", "load_wind"}
-    of_goals = {"load_goal", "goal_reward", "current_at"}
-    elsewhere = {"step_of_task", "reward_of_another", *of_trials, *of_goals}
-    stages = {"point", "sums", "slope", "slopes"}
-    for name, function in asked.items():
-        with pytest.raises(
-            NotImplementedError, match=r"when a loop is compiled|given by a task"
-        ):
-            function(*[None] * function.__code__.co_argcount)
-        if name in elsewhere or name.partition("_")[2] in stages:
-            continue
-        if name in ("point_of", "add_row", "sum_accelerations"):  # of a kernel's ship
-            continue
-        filled = program.hooks[name]
-        most = filled.__code__.co_argcount
-        least = most - len(filled.__defaults__ or ())
-        assert least <= function.__code__.co_argcount <= most, name
 
 
 def test_models_of_one_structure_share_what_is_compiled():
@@ -286,7 +249,7 @@ def test_a_function_within_another_is_refused_with_what_it_uses_of_it():
 def test_another_ship_sea_or_function_has_a_fingerprint_of_its_own():
     loop = LOOPS["simulate"].function
     mariner, container = (
-        {**sea_hooks(False, lanes=1), **shipgym.load_model(name).compiled.hooks(1)}
+        {**CALM_SEA.hooks(1), **shipgym.load_model(name).compiled.hooks(1)}
         for name in ("mariner", "container")
     )
 
@@ -298,7 +261,7 @@ def test_another_ship_sea_or_function_has_a_fingerprint_of_its_own():
         fingerprint(loop, container),
         fingerprint(loop, {**mariner, "accelerations": twice}),
         fingerprint(loop, {**mariner, "HAS_LAG": False}),
-        fingerprint(loop, {**mariner, **sea_hooks(True, lanes=1)}),
+        fingerprint(loop, {**mariner, **OPEN_SEA.hooks(1)}),
     }
     assert len(tags) == 5
     assert fingerprint(loop, dict(mariner)) in tags

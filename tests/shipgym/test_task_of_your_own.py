@@ -16,11 +16,7 @@ from stable_baselines3 import PPO
 
 import shipgym
 from shipgym import InputError, ShipVecEnv, check_task, check_vector_env, register_task
-from shipgym.envs.engine import Engine
-from shipgym.python_files import load_file
-from shipgym.tasks.contract import NO_NUMBERS, Numbers, Setting
-from shipgym.tasks.definition import no_worst_cost, read_definition
-from shipgym.tasks.source import (
+from shipgym.engine.source import (
     annotated,
     check_namespace,
     kept_source,
@@ -28,6 +24,10 @@ from shipgym.tasks.source import (
     make_settings,
     read_source,
 )
+from shipgym.envs.engine import Engine
+from shipgym.python_files import load_file
+from shipgym.tasks.contract import NO_NUMBERS, Numbers, Setting
+from shipgym.tasks.definition import no_worst_cost, read_definition
 from shipgym.tasks.task import Task
 
 ROOT = Path(__file__).parents[2]

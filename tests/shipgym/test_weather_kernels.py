@@ -17,7 +17,6 @@ import shipgym
 from shipgym import InputError, manoeuvres
 from shipgym.engine import random
 from shipgym.engine.motion import Motion
-from shipgym.engine.records import Layout
 from shipgym.envs.engine import Engine
 from shipgym.instruments import bridge
 from shipgym.models.simulate import Conditions, Passage, open_loop, simulate
@@ -680,10 +679,3 @@ def test_wrong_weather(mariner):
         course_keeping_task(sea=7)
     with pytest.raises(InputError, match=r"seed: expected .*got -1"):
         ahead(mariner, "rough", 2, seed=-1)
-
-
-def test_calm_water_is_a_sea_of_zeros_that_takes_no_rows():
-    state, parameters = (Layout(sea=kind) for kind in open_sea.sea_records(windy=False))
-    assert state.n_rows == parameters.n_rows == 0
-    calm = open_sea.sea_hooks(windy=False, lanes=1)
-    assert calm["load_sea"](np.zeros(0), 0) == Sea(*[0.0] * len(Sea._fields))

@@ -11,6 +11,7 @@ from typing import Any, get_args, get_origin
 import numpy as np
 
 from shipgym.checks import check_keys, check_number, check_whole, unexpected
+from shipgym.engine.annotations import Setting
 from shipgym.engine.extra_arguments import EXTRAS, takes_extras
 from shipgym.engine.records import (
     Record,
@@ -24,7 +25,6 @@ from shipgym.engine.records import (
 from shipgym.errors import InputError
 from shipgym.python_files import asked, check_function, load_file, refuse_closure
 from shipgym.refused_code import refuse_foreign_random, refuse_writes_to_plan
-from shipgym.tasks.contract import Setting
 
 UNBOUNDED = Setting("")
 
