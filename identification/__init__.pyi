@@ -18,38 +18,18 @@ from .design.reduction import (
 from .design.sensitivity import (
     sensitivity as sensitivity,
 )
-from .estimators.by_name import minimise as minimise
-from .estimators.comparators import LeastSquares as LeastSquares
-from .estimators.comparators import (
-    LinearSupportVectorMachine as LinearSupportVectorMachine,
-)
-from .estimators.comparators import RidgeRegression as RidgeRegression
 from .estimators.kernel_residual import KernelResidual as KernelResidual
-from .estimators.library import (
-    GaussianProcess as GaussianProcess,
-)
-from .estimators.library import (
-    KalmanRegression as KalmanRegression,
-)
-from .estimators.library import (
-    LassoRegression as LassoRegression,
-)
-from .estimators.library import (
-    RelevanceRegression as RelevanceRegression,
-)
 from .estimators.lssvm import (
     LSSVM as LSSVM,
 )
+from .estimators.lssvm import LeastSquares as LeastSquares
+from .estimators.lssvm import RidgeRegression as RidgeRegression
 from .estimators.lssvm import (
     TruncatedLSSVM as TruncatedLSSVM,
 )
 from .estimators.optimisers import ArtificialBeeColony as ArtificialBeeColony
-from .estimators.optimisers import DifferentialEvolution as DifferentialEvolution
 from .estimators.optimisers import GridSearch as GridSearch
 from .estimators.optimisers import ParticleSwarm as ParticleSwarm
-from .estimators.polynomial import (
-    polynomial_coefficients as polynomial_coefficients,
-)
 from .estimators.recursive import (
     MultiInnovationLeastSquares as MultiInnovationLeastSquares,
 )

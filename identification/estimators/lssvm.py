@@ -338,6 +338,55 @@ class TruncatedLSSVM(LinearRegressor):
         return variance_rank(singular_values, self.explained_variance)
 
 
+@dataclass(eq=False, repr=False)
+class LeastSquares(TruncatedLSSVM):
+    """Least squares: every direction of the features above rounding is kept.
+
+    Parameters
+    ----------
+    scale : bool or array-like of shape (n_features,)
+        Scales that tell rounding from what the data determine, as of `LSSVM`.
+    robust : bool
+        As of `LSSVM`.
+    """
+
+    name: ClassVar[str] = "ls"
+    options: ClassVar[tuple[str, ...]] = ("scale", "robust")
+    regularised: ClassVar[bool] = False
+
+    selection: str = "full"
+
+
+@dataclass(eq=False, repr=False)
+class RidgeRegression(LSSVM):
+    """Ridge regression as scikit-learn has it, on columns as they are by default.
+
+    Parameters
+    ----------
+    alpha : float, at least 0
+        Penalty, the inverse of the weight of the errors.
+    scale : bool or array-like of shape (n_features,)
+        As of `LSSVM`.
+    robust : bool
+        As of `LSSVM`.
+    """
+
+    name: ClassVar[str] = "ridge"
+    options: ClassVar[tuple[str, ...]] = ("alpha", "scale", "robust")
+
+    scale: bool | ArrayLike = False
+    alpha: float = 1e-6
+
+    def check(self) -> None:
+        """Refuse settings that cannot be, by an InputError that names the setting."""
+        super().check()
+        check_number(self.alpha, "alpha", at_least=0.0)
+
+    def error_weight(self) -> float:
+        """Weight of the squared errors in the solution."""
+        return 1.0 / self.alpha if self.alpha else np.inf
+
+
 def _main_features(direction: Floats, least_share: float = 0.1) -> tuple[int, ...]:
     """Features of at least a tenth of the largest share in a direction."""
     sizes = np.abs(direction)

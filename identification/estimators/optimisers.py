@@ -1,13 +1,15 @@
-"""Optimisers: grid, particle swarm, differential evolution, artificial bee colony."""
+"""Optimisers: grid, particle swarm and artificial bee colony."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from identification.estimators.search import Optimiser, Recorder
+from shipgym import InputError
 from shipgym.arrays import Floats, Integers
-from shipgym.checks import check_whole
+from shipgym.checks import check_choice, check_whole
 
 MOST = 100_000  # particles, rounds and the like of a search
 
@@ -123,53 +125,6 @@ class ParticleSwarm(Optimiser):
         towards_own = by_own * (best - place)
         towards_common = by_common * (common_best - place)
         return self.inertia * velocity + towards_own + towards_common
-
-
-@dataclass(frozen=True)
-class DifferentialEvolution(Optimiser):
-    """SciPy's differential evolution (Storn & Price 1997), without its final polish.
-
-    Parameters
-    ----------
-    members : int
-        Candidates in each dimension; SciPy takes at least 5 in all.
-    rounds : int
-        Generations.
-    """
-
-    members: int = 20
-    rounds: int = 60
-
-    def _search(
-        self,
-        record: Recorder,
-        low: Floats,
-        high: Floats,
-        rng: np.random.Generator,
-    ) -> None:
-        from scipy.optimize import Bounds, differential_evolution
-
-        check_whole(self.members, "members", at_least=5, at_most=MOST)
-        check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
-
-        def values_of_columns(x: Any, /) -> Any:
-            # SciPy gives a column for each candidate, takes no infinite values, and
-            # squares them
-            return np.minimum(record(np.atleast_2d(x.T)), 1e150)
-
-        differential_evolution(
-            values_of_columns,
-            Bounds(low, high),
-            maxiter=self.rounds,
-            popsize=self.members,
-            tol=0.0,
-            atol=0.0,
-            rng=rng,
-            polish=False,
-            vectorized=True,
-            updating="deferred",
-            callback=lambda intermediate_result: record.end_round(),
-        )
 
 
 @dataclass(frozen=True)
@@ -315,3 +270,26 @@ def _start(
     values = record(drawn)
     record.end_round()
     return drawn, values
+
+
+OPTIMISERS: dict[str, type[Optimiser]] = {
+    "abc": ArtificialBeeColony,
+    "pso": ParticleSwarm,
+    "grid": GridSearch,
+}
+
+
+def get_optimiser(optimiser: str | Mapping[str, Any] | Optimiser) -> Optimiser:
+    """An optimiser as given, by name, or by a table `{"name": "abc", "rounds": 60}`."""
+    if hasattr(optimiser, "minimise"):
+        return cast(Optimiser, optimiser)
+    table = optimiser if isinstance(optimiser, Mapping) else {"name": optimiser}
+    settings = dict(table)
+    name = check_choice(settings.pop("name", None), OPTIMISERS, "optimiser")
+    try:
+        return OPTIMISERS[name](**settings)
+    except TypeError as error:
+        raise InputError(
+            f"optimiser: expected settings of {name!r}, got {', '.join(settings)}:"
+            f" {error}"
+        ) from None

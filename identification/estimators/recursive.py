@@ -13,21 +13,19 @@ slope 1 at 0, with e in units of the targets' root mean square.
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sklearn.utils.validation import check_is_fitted
 
-from identification.arrays import column_rms
+from identification.arrays import column_rms, root_mean_square
 from identification.estimators.decomposition import check_scale, scales_of
 from identification.estimators.linear import LinearRegressor, validated
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.recursive_kernels import (
+    innovation,
     least_squares,
-    stochastic_gradient,
 )
-from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_flag, check_number, check_whole
 
@@ -39,6 +37,14 @@ OPTIONS = (
     "start_interval",
     "start_C",
 )
+
+
+class _Start(NamedTuple):
+    """Where a recursion begins, in scaled units."""
+
+    theta: Floats  # shape (n_features,)
+    covariance: Floats  # shape (n_features, n_features)
+    samples: Floats  # those the start was made from, shape (n_start, n_features)
 
 
 @dataclass(eq=False, repr=False)
@@ -67,15 +73,15 @@ class Recursion(LinearRegressor):
 
     Attributes
     ----------
-    coef_ : array of shape (n_features,) or (n_signals, n_features)
+    coef_ : array of shape (n_features,)
         Estimate after the last sample.
     covariance_ : array of shape (n_features, n_features)
         Of the least-squares estimate that the recursion tends to, for exact features
         and independent errors (after `fit`).
     inverse_moment_ : array of shape (n_features, n_features)
-        Inverse of X'WX plus the start's, with W the weights (after `fit`).
+        Inverse of X'WX plus the start's, with W the weights.
     weights_ : array of shape (n_samples,)
-        How much each sample still counts (after `fit`).
+        How much each sample still counts.
     scale_ : array of shape (n_features,)
         Divisors of the regressors inside.
     """
@@ -120,135 +126,41 @@ class Recursion(LinearRegressor):
         """Fit, and return the estimates after each sample, (n_samples, n_features).
 
         While LS-SVR gathers its samples these are the coefficients that it will find
-        from them.
+        from them (LSSVR-RLS, Zhu 2018, section 7.3).
         """
         self.check()
         features, targets = validated(self, X, y)
-        of_one_signal = targets[:, None]
-        self._begin(features, of_one_signal)
+        n_samples, n_features = features.shape
+        self.scale_ = scales_of(column_rms(features), self.scale)
+        unit = root_mean_square(targets) or 1.0
+        scaled = features / self.scale_
 
-        n_samples = len(targets)
         gathered = min(self.start_samples * self.start_interval, n_samples)
         picked = slice(0, gathered, self.start_interval)
-        if gathered:
-            self._start_from(features[picked], targets[picked])
-        start = np.tile(self.coef_, (gathered, 1))
-
         rest = slice(gathered, None)
-        history = self._run(features[rest, None], of_one_signal[rest])
+        theta = np.zeros(n_features)
+        covariance = self.C * np.eye(n_features)
+        if gathered:
+            start = LSSVM(C=self.start_C, scale=self.scale_, fit_intercept=False)
+            start.fit(features[picked], targets[picked])
+            theta = start.coef_ * self.scale_ / unit
+            covariance = start.inverse_moment_ * np.outer(self.scale_, self.scale_)
+
+        history = np.tile(theta, (n_samples, 1))
+        self._advance(
+            np.ascontiguousarray(scaled[rest]),
+            targets[rest] / unit,
+            _Start(theta, covariance, scaled[picked]),
+            history[rest],
+        )
+        history *= unit / self.scale_
+        self.coef_ = history[-1].copy()
 
         counts = np.zeros(n_samples)
         counts[picked] = 1.0
         counts[rest] = 1.0
         self.weights_ = counts * self._influence(n_samples)
         self._summarise(features, targets)
-        return np.concatenate([start, history[:, 0]])
-
-    def update(self, phi: ArrayLike, y: ArrayLike) -> Self:
-        """Take in the next sample or samples.
-
-        Scales are fixed by the first call: give several samples first, or `scale`.
-
-        Parameters
-        ----------
-        phi : array-like
-            Regressors of shape (n_samples, n_signals, n_features); where signals share
-            them, (n_features,) or (n_samples, n_features).
-        y : array-like of shape (n_samples,) or (n_samples, n_signals)
-            Targets.
-
-        Raises
-        ------
-        InputError
-            For shapes that do not fit and numbers that are not finite.
-        """
-        self.check()
-        features, targets = _shaped(phi, y)
-        if not hasattr(self, "_theta"):
-            self._begin(features, targets)
-        if features.shape[1:] != self._theta.shape:
-            _, n_signals, n_features = features.shape
-            expected_signals, expected_features = self._theta.shape
-            raise InputError(
-                f"phi: expected {expected_signals} signals of {expected_features}"
-                f" regressors as before, got {n_signals} of {n_features}"
-            )
-        self._run(features, targets)
-        return self
-
-    @property
-    def theta(self) -> Floats:
-        """Estimate after the last sample, as `coef_`."""
-        check_is_fitted(self, "coef_")
-        return self.coef_
-
-    @property
-    def covariance(self) -> Floats | None:
-        """Covariance of `theta` by variance of the errors.
-
-        Shape (n_features, n_features) or (n_signals, n_features, n_features); None for
-        the stochastic gradient.
-        """
-        check_is_fitted(self, "coef_")
-        if not hasattr(self, "_P"):
-            return None
-        unscale = np.outer(self.scale_, self.scale_)
-        unscaled: Floats = self._P / unscale
-        shape = self.coef_.shape
-        return unscaled.reshape(*shape, -1)
-
-    def _begin(self, features: Floats, targets: Floats) -> None:
-        """Begin with zero coefficients, in scales that the samples give."""
-        n_signals = targets.shape[1]
-        n_features = features.shape[-1]
-        every_row = features.reshape(-1, n_features)
-        size = column_rms(every_row)
-        self.scale_ = scales_of(size, self.scale)
-        unit = column_rms(targets)
-        self._unit = np.where(unit > 0.0, unit, 1.0)
-
-        self._theta = np.zeros((n_signals, n_features))
-        self._keep(self._theta)
-        self._begin_memory()
-
-    def _keep(self, estimates: Floats) -> None:
-        """Set `coef_`, of one signal without the axis of the signals."""
-        self.coef_ = estimates.copy()
-        if len(estimates) == 1:
-            self.coef_ = estimates[0].copy()
-
-    def _start_from(self, features: Floats, targets: Floats) -> None:
-        """Take LS-SVR's estimate on the first samples, and its certainty.
-
-        Source: LSSVR-RLS, Zhu 2018, section 7.3.
-        """
-        start = LSSVM(
-            C=self.start_C,
-            scale=self.scale_,
-            fit_intercept=False,
-        )
-        start.fit(features, targets)
-        self.coef_ = start.coef_
-        self._theta[0] = start.coef_ * self.scale_ / self._unit
-        self._remember_start(features / self.scale_, start.inverse_moment_)
-
-    def _run(self, features: Floats, targets: Floats) -> Floats:
-        """Take in samples; return the estimate after each of them.
-
-        Both of shape (n_samples, n_signals, n_features).
-        """
-        scaled = features / self.scale_
-        in_units = targets / self._unit
-        history: Floats = np.empty(features.shape)
-        self._advance(
-            np.ascontiguousarray(scaled),
-            np.ascontiguousarray(in_units),
-            history,
-        )
-
-        history *= self._unit[:, None] / self.scale_
-        if len(history):
-            self._keep(history[-1])
         return history
 
     def _influence(self, n_samples: int) -> Floats:
@@ -280,15 +192,7 @@ class Recursion(LinearRegressor):
         self.covariance_ = covariance / unscale
 
     @abstractmethod
-    def _begin_memory(self) -> None:
-        """Set up what is kept besides the estimate."""
-
-    @abstractmethod
-    def _remember_start(self, scaled: Floats, inverse_moment: Floats) -> None:
-        """Keep how certain a start from scaled samples is."""
-
-    @abstractmethod
-    def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
+    def _advance(self, phi: Floats, y: Floats, start: _Start, history: Floats) -> None:
         """Take in scaled samples and fill the history of the scaled estimate."""
 
 
@@ -302,41 +206,21 @@ class RecursiveLeastSquares(Recursion):
     name: ClassVar[str] = "rls"
     options: ClassVar[tuple[str, ...]] = OPTIONS
 
-    def _begin_memory(self) -> None:
-        n_signals, n_features = self._theta.shape
-        start = self.C * np.eye(n_features)
-        shape = (n_signals, n_features)
-        self._P = np.tile(start, (n_signals, 1, 1))
-        self._ceiling = np.full(shape, float(self.C))
-        self._past_phi = np.empty((0, *shape))
-        self._past_y = np.empty((0, n_signals))
-
-    def _remember_start(self, scaled: Floats, inverse_moment: Floats) -> None:
-        to_scaled = np.outer(self.scale_, self.scale_)
-        self._P[0] = inverse_moment * to_scaled
-
-    def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
-        n_past = len(self._past_y)
-        phi = np.concatenate([self._past_phi, phi])
-        y = np.concatenate([self._past_y, y])
+    def _advance(self, phi: Floats, y: Floats, start: _Start, history: Floats) -> None:
+        n_features = phi.shape[1]
         run = least_squares(self.inverse_free)
         run(
             phi,
             y,
-            n_past,
-            self._theta,
-            self._P,
-            self._ceiling,
+            start.theta,
+            start.covariance,
+            np.full(n_features, float(self.C)),
             float(self.forgetting),
             self.innovations,
             float(self.omega),
             history,
-            np.empty(phi.shape[-1]),
+            np.empty(n_features),
         )
-        n_kept = min(self.innovations - 1, len(y))
-        first_kept = len(y) - n_kept
-        self._past_phi = phi[first_kept:].copy()
-        self._past_y = y[first_kept:].copy()
 
 
 @dataclass(eq=False, repr=False)
@@ -400,52 +284,12 @@ class StochasticGradient(Recursion):
         """NISG with a nonlinear innovation, SG with a linear one."""
         return "nisg" if self.omega > 0.0 else "sg"
 
-    def _begin_memory(self) -> None:
-        self._r = np.zeros(len(self._theta))
-
-    def _remember_start(self, scaled: Floats, inverse_moment: Floats) -> None:
-        self._r += np.sum(scaled**2)
-
-    def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
-        run = stochastic_gradient()
-        run(
-            phi,
-            y,
-            self._theta,
-            self._r,
-            float(self.forgetting),
-            float(self.omega),
-            history,
-        )
-
-
-def _shaped(phi: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
-    """Samples (n_samples, n_signals, n_features) and targets (n_samples, n_signals)."""
-    features = np.asarray(phi, dtype=float)
-    targets = np.atleast_1d(np.asarray(y, dtype=float))
-    if features.ndim == 1:  # a single sample
-        features = features[None]
-        targets = targets.reshape(1, -1)
-    if features.ndim == 2:
-        features = features[:, None]
-    if targets.ndim == 1:
-        targets = targets[:, None]
-
-    have_axes = features.ndim == 3 and targets.ndim == 2
-    if not have_axes or len(features) != len(targets):
-        raise InputError(
-            "phi, y: expected shapes (n_samples, n_features) and (n_samples,), or"
-            " (n_samples, n_signals, n_features) and (n_samples, n_signals), got"
-            f" {np.shape(phi)} and {np.shape(y)}"
-        )
-    n_signals = targets.shape[1]
-    n_given = features.shape[1]
-    if n_given not in (1, n_signals):
-        raise InputError(f"phi: expected {n_signals} signals as in y, got {n_given}")
-    if not (np.isfinite(features).all() and np.isfinite(targets).all()):
-        raise InputError(
-            "phi, y: expected finite numbers, got one that is not; repair the samples"
-            " first"
-        )
-    shape = (*targets.shape, features.shape[-1])
-    return np.broadcast_to(features, shape), targets
+    def _advance(self, phi: Floats, y: Floats, start: _Start, history: Floats) -> None:
+        theta = start.theta
+        size = float(np.sum(start.samples**2))
+        for k, (regressors, target) in enumerate(zip(phi, y, strict=True)):
+            error = target - theta @ regressors
+            size = self.forgetting * size + regressors @ regressors
+            if size > 0.0:
+                theta += innovation(error, self.omega) / size * regressors
+            history[k] = theta

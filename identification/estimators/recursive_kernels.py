@@ -1,10 +1,9 @@
-"""Recursions: one pass over samples in time order, for any number of signals.
+"""Recursions: one pass over samples in time order.
 
-Arrays are `phi`, regressors of shape (n_samples, n_signals, n_features), `y`, targets
-of shape (n_samples, n_signals), `theta`, estimates of shape (n_signals, n_features),
-and `P`, covariances of shape (n_signals, n_features, n_features). Rows of `phi` and `y`
-before `first` are of an earlier call. `theta` and `P` are changed in place; `history`,
-shape (n_samples - first, n_signals, n_features), receives each theta.
+Arrays are `phi`, regressors of shape (n_samples, n_features), `y`, targets of shape
+(n_samples,), `theta`, an estimate of shape (n_features,), and `P`, its covariance.
+`theta` and `P` are changed in place; `history`, of the shape of `phi`, receives each
+theta.
 """
 
 from functools import cache
@@ -15,7 +14,7 @@ import numpy as np
 
 from shipgym.engine.compiling import compiled
 
-VECTOR, TABLE, CUBE = "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]"
+VECTOR, TABLE = "float64[::1]", "float64[:, ::1]"
 
 
 def innovation(error: float, omega: float) -> float:
@@ -75,7 +74,6 @@ def rank_one(phi: Any, y: float, theta: Any, P: Any, omega: float, gain: Any) ->
 def scalar_updates(
     phi: Any,
     y: Any,
-    first: int,
     theta: Any,
     P: Any,
     ceiling: Any,
@@ -89,22 +87,19 @@ def scalar_updates(
 
     Source: TMILS, Song 2020, equation 4-12.
     """
-    n_signals, n_features = theta.shape
-    for t in range(first, phi.shape[0]):
+    for t in range(phi.shape[0]):
         oldest = max(t - innovations + 1, 0)
-        for s in range(n_signals):
-            if forgetting < 1.0:
-                forget(P[s], forgetting, ceiling[s], scratch)
-            for i in range(oldest, t + 1):
-                rank_one(phi[i, s], y[i, s], theta[s], P[s], omega, scratch)
-            for j in range(n_features):
-                history[t - first, s, j] = theta[s, j]
+        if forgetting < 1.0:
+            forget(P, forgetting, ceiling, scratch)
+        for i in range(oldest, t + 1):
+            rank_one(phi[i], y[i], theta, P, omega, scratch)
+        for j in range(theta.size):
+            history[t, j] = theta[j]
 
 
 def matrix_updates(
     phi: Any,
     y: Any,
-    first: int,
     theta: Any,
     P: Any,
     ceiling: Any,
@@ -118,75 +113,29 @@ def matrix_updates(
 
     Source: MILS, Song 2020, equation 4-11.
     """
-    n_signals = theta.shape[0]
-    for t in range(first, phi.shape[0]):
-        oldest = max(t - innovations + 1, 0)
-        for s in range(n_signals):
-            if forgetting < 1.0:
-                forget(P[s], forgetting, ceiling[s], scratch)
-
-            latest = slice(oldest, t + 1)
-            X = np.ascontiguousarray(phi[latest, s])
-            errors = y[latest, s] - X @ theta[s]
-            for i in range(errors.size):
-                errors[i] = innovation(errors[i], omega)
-
-            XP = X @ P[s]
-            covariance = np.eye(errors.size) + XP @ X.T
-            gain = np.linalg.solve(covariance, XP)
-            theta[s] += errors @ gain
-            P[s] -= XP.T @ gain
-            P[s] = 0.5 * (P[s] + P[s].T)  # else forgetting blows rounding errors up
-            history[t - first, s] = theta[s]
-
-
-def gradient_updates(
-    phi: Any,
-    y: Any,
-    theta: Any,
-    r: Any,
-    forgetting: float,
-    omega: float,
-    history: Any,
-) -> None:
-    """Stochastic gradient: theta += phi e / r, r += |phi|^2.
-
-    Source: Song 2020, equations 3-3 to 3-8.
-    """
-    n_signals, n_features = theta.shape
     for t in range(phi.shape[0]):
-        for s in range(n_signals):
-            error = y[t, s]
-            size = 0.0
-            for j in range(n_features):
-                regressor = phi[t, s, j]
-                error -= theta[s, j] * regressor
-                size += regressor * regressor
-
-            r[s] = forgetting * r[s] + size
-            step = 0.0
-            if r[s] > 0.0:
-                step = innovation(error, omega) / r[s]
-            for j in range(n_features):
-                theta[s, j] += step * phi[t, s, j]
-                history[t, s, j] = theta[s, j]
+        oldest = max(t - innovations + 1, 0)
+        if forgetting < 1.0:
+            forget(P, forgetting, ceiling, scratch)
+        X = phi[oldest : t + 1]
+        errors = y[oldest : t + 1] - X @ theta
+        for i in range(errors.size):
+            errors[i] = innovation(errors[i], omega)
+        XP = X @ P
+        covariance = np.eye(errors.size) + XP @ X.T
+        gain = np.linalg.solve(covariance, XP)
+        theta += errors @ gain
+        P -= XP.T @ gain
+        P[:] = 0.5 * (P + P.T)  # else forgetting blows rounding errors up
+        history[t] = theta
 
 
 @cache
 def least_squares(one_by_one: bool = True) -> Any:
     """`scalar_updates` or `matrix_updates`, compiled."""
     arguments = (
-        f"{CUBE}, {TABLE}, int64, {TABLE}, {CUBE}, {TABLE}, float64, int64, float64,"
-        f" {CUBE}, {VECTOR}"
+        f"{TABLE}, {VECTOR}, {VECTOR}, {TABLE}, {VECTOR}, float64, int64, float64,"
+        f" {TABLE}, {VECTOR}"
     )
     loop = scalar_updates if one_by_one else matrix_updates
     return compiled(loop, f"void({arguments})", {}, "recursive least squares")
-
-
-@cache
-def stochastic_gradient() -> Any:
-    """`gradient_updates`, compiled."""
-    arguments = f"{CUBE}, {TABLE}, {TABLE}, {VECTOR}, float64, float64, {CUBE}"
-    return compiled(
-        gradient_updates, f"void({arguments})", {}, "the stochastic gradient"
-    )

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 from sklearn.base import clone
 
 from identification.arrays import mean_square
-from identification.estimators.by_name import OPTIMISERS, get_optimiser
 from identification.estimators.decomposition import check_scale, decompose
 from identification.estimators.estimator import Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, check_weight, validated
@@ -21,6 +20,7 @@ from identification.estimators.objectives import (
     time_blocks,
     training_error,
 )
+from identification.estimators.optimisers import OPTIMISERS, get_optimiser
 from identification.estimators.search import Optimiser, SearchResult
 from identification.samples.prediction import predict
 from shipgym import InputError, ShipModel, Trial
@@ -38,9 +38,9 @@ class TunedLSSVM(LinearRegressor):
 
     Parameters
     ----------
-    optimiser : {"abc", "pso", "grid", "de"}, table or Optimiser
-        Artificial bee colony, particle swarm, grid or differential evolution; with its
-        settings as `{"name": "abc", "rounds": 60}`.
+    optimiser : {"abc", "pso", "grid"}, table or Optimiser
+        Artificial bee colony, particle swarm or grid; with its settings as
+        `{"name": "abc", "rounds": 60}`.
     objective : {"k-fold", "training", "free-running"}
         Error on held-out blocks of time; error on the fitted samples, as in the thesis,
         whose optimum is the upper bound; error of the simulated trials, slower, but
@@ -98,7 +98,6 @@ class TunedLSSVM(LinearRegressor):
         method_names = {
             "abc": "abc-lssvr",
             "pso": "pso-lssvr",
-            "de": "de-lssvr",
             "grid": "cv-lssvr",
         }
         for name, known in OPTIMISERS.items():

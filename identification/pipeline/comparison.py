@@ -34,7 +34,6 @@ USUAL = (
     "tls-svm",
     "cv-lssvr",
     "abc-lssvr",
-    "svr",
     "tmils",
     "output-error",
 )

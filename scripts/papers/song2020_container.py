@@ -205,7 +205,7 @@ def regression(
 
 def as_paper(X: Floats, y: Floats) -> Floats:
     """Inverse-free multi-innovation least squares with nonlinear innovation."""
-    found: Floats = MultiInnovationLeastSquares(omega=OMEGA).fit(X, y).theta
+    found: Floats = MultiInnovationLeastSquares(omega=OMEGA).fit(X, y).coef_
     return found
 
 

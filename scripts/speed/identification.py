@@ -77,7 +77,7 @@ def recursive_updates(n_samples: int = 50_000, n_terms: int = 15) -> Row:
     random = np.random.default_rng(0)
     X = random.standard_normal((n_samples, n_terms))
     y = X @ random.standard_normal(n_terms) + 0.1 * random.standard_normal(n_samples)
-    machine = RecursiveLeastSquares(forgetting=0.999).update(X[:100], y[:100])
+    machine = RecursiveLeastSquares(forgetting=0.999).fit(X[:100], y[:100])
 
     def in_numpy(n: int = 2000) -> None:
         theta, P = np.zeros(n_terms), 1e6 * np.eye(n_terms)
@@ -87,7 +87,7 @@ def recursive_updates(n_samples: int = 50_000, n_terms: int = 15) -> Row:
             theta += gain * (target - phi @ theta)
             P = (P - np.outer(gain, phi @ P)) / 0.999
 
-    compiled = n_samples / best_time(lambda: machine.update(X, y))
+    compiled = n_samples / best_time(lambda: machine.fit(X, y))
     plain = 2000 / best_time(in_numpy)
     return Row(
         f"recursive least squares, {n_terms} coefficients",

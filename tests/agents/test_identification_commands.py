@@ -67,7 +67,7 @@ def test_options_come_from_the_ship_file(ship, demo):
         ship(
             'structure = "linear-steering"',
             'method = "abc-lssvr"',
-            'optimiser = { name = "de", rounds = 5 }',
+            'optimiser = { name = "pso", rounds = 5 }',
             "bounds = [1.0, 1e6]",
             'samples = { rule = "integral", window = 9 }',
             'preprocessing = "savgol"',
@@ -81,9 +81,9 @@ def test_options_come_from_the_ship_file(ship, demo):
         )
     )
     told = result.settings
-    assert told["method"]["name"] == "de-lssvr"
+    assert told["method"]["name"] == "pso-lssvr"
     assert told["method"]["bounds"] == [1.0, 1e6]
-    assert told["method"]["optimiser"] == {"name": "de", "rounds": 5}
+    assert told["method"]["optimiser"] == {"name": "pso", "rounds": 5}
     assert told["samples"] == {"rule": "integral", "window": 9}
     assert told["preprocessing"] == {"smoothing": "savgol", "repair": True}
     assert told["prior"] == {"source": "clarke", "strength": 0.1, "folds": "trials"}

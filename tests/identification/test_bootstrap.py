@@ -83,7 +83,7 @@ def test_a_block_holds_the_rows_of_its_time() -> None:
     assert rows_in(10.0, np.array([3.0])) == rows_in(10.0, np.zeros(3)) == 1
 
 
-@pytest.mark.parametrize("method", ["ridge", "tls-svm", "svr"])
+@pytest.mark.parametrize("method", ["ridge", "tls-svm", "rls"])
 def test_svms_are_fitted_again_with_the_rank_they_had_and_others_take_a_linear_step(
     method: str,
 ) -> None:
@@ -102,7 +102,7 @@ def test_svms_are_fitted_again_with_the_rank_they_had_and_others_take_a_linear_s
     for _ in range(6):
         rows = moving_blocks([np.arange(40)], [4], rng)
         step = fitted.inverse_moment_ @ X[rows].T @ errors[rows]
-        found.append(step if method == "svr" else again.fit(X[rows], y[rows]).coef_)
+        found.append(step if method == "rls" else again.fit(X[rows], y[rows]).coef_)
     drawn = bootstrap_covariance({"u": fitted}, samples, 4.0, draws=6, seed=5)
     np.testing.assert_allclose(drawn, np.cov(np.array(found).T), rtol=1e-9)
 
