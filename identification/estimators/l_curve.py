@@ -99,12 +99,3 @@ def gcv_rank(curve: LCurve, n_samples: int) -> int:
     score[freedom <= 0] = np.inf
     best = np.argmin(score)
     return int(ranks[best])
-
-
-def variance_rank(singular_values: Floats, share: float) -> int:
-    """Least rank that holds a share, 0 to 1, of the variance of the features."""
-    held = np.cumsum(singular_values**2)
-    # the last sum is compared with itself, so that a share of 1 keeps all
-    wanted = share * held[-1]
-    needed = int(np.searchsorted(held, wanted)) + 1
-    return min(needed, len(held))

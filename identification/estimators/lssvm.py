@@ -25,7 +25,6 @@ from identification.estimators.l_curve import (
     corner_rank,
     gcv_rank,
     l_curve,
-    variance_rank,
 )
 from identification.estimators.linear import LinearRegressor, check_weight, validated
 from identification.estimators.robust import fit_weighted
@@ -44,8 +43,8 @@ class LSSVM(LinearRegressor):
     ----------
     C : float, above 0
         Weight of the errors; infinity gives least squares (linear kernel only).
-    kernel : {"linear", "rbf", "poly"}
-        Linear in primal form; the others solve the dual system by Cholesky
+    kernel : {"linear", "rbf"}
+        Linear in primal form; the other solves the dual system by Cholesky
         decomposition.
     scale : bool or array-like of shape (n_features,)
         Divide each feature by its standard deviation (its root mean square without
@@ -54,11 +53,7 @@ class LSSVM(LinearRegressor):
     fit_intercept : bool
         Whether b is free or zero.
     gamma : float or None
-        Of the rbf and poly kernels; 1 / n_features where None.
-    degree : int
-        Of the poly kernel.
-    coef0 : float
-        Of the poly kernel.
+        Of the rbf kernel; 1 / n_features where None.
     robust : bool
         Whether outliers lose their influence: samples are weighted by their residuals
         and fitted again until the weights converge (weighted LS-SVM, Suykens et al.
@@ -80,12 +75,12 @@ class LSSVM(LinearRegressor):
     noise_variance_ : float
         From the residuals and the effective degrees of freedom (linear kernel).
     dual_coef_ : array of shape (n_samples,)
-        Lagrange multipliers (rbf and poly kernels).
+        Lagrange multipliers (rbf kernel).
     support_ : array of shape (n_samples, n_features)
-        Centred and scaled samples that the multipliers belong to (rbf and poly
-        kernels).
+        Centred and scaled samples that the multipliers belong to (rbf
+        kernel).
     ridge_ : KernelRidge
-        The kernel's matrix and its solution by scikit-learn (rbf and poly kernels).
+        The kernel's matrix and its solution by scikit-learn (rbf kernel).
     weights_ : array of shape (n_samples,)
         Of the samples; 1 but for outliers.
     n_features_in_ : int
@@ -100,20 +95,16 @@ class LSSVM(LinearRegressor):
     scale: bool | ArrayLike = True
     fit_intercept: bool = True
     gamma: float | None = None
-    degree: int = 3
-    coef0: float = 1.0
     robust: bool = False
 
     def check(self) -> None:
         """Refuse settings that cannot be, by an InputError that names the setting."""
-        kernels = ("linear", "rbf", "poly")
+        kernels = ("linear", "rbf")
         check_choice(self.kernel, kernels, "kernel")
         check_weight(self.C)
         check_scale(self.scale)
         if self.gamma is not None:
             check_number(self.gamma, "gamma", above=0.0)
-        check_whole(self.degree, "degree", at_least=1)
-        check_number(self.coef0, "coef0")
         check_flag(self.robust, "robust")
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
@@ -180,8 +171,6 @@ class LSSVM(LinearRegressor):
             alpha=1.0 / self.C,
             kernel=self.kernel,
             gamma=self.gamma,
-            degree=self.degree,
-            coef0=self.coef0,
         )
 
     def predict(self, X: ArrayLike) -> Floats:
@@ -209,16 +198,13 @@ class TruncatedLSSVM(LinearRegressor):
         Weight of the errors; infinity truncates without penalty.
     rank : int or None, at least 1
         Number of directions to keep; None leaves it to `selection`.
-    selection : {"l-curve", "gcv", "explained-variance", "full"}
-        Choice of the rank: corner of the L-curve, generalised cross-validation, as many
-        directions as hold the share `explained_variance` of the features, or every
-        direction above rounding.
+    selection : {"l-curve", "gcv", "full"}
+        Choice of the rank: corner of the L-curve, generalised cross-validation, or
+        every direction above rounding.
     scale : bool or array-like of shape (n_features,)
         As of `LSSVM`.
     fit_intercept : bool
         As of `LSSVM`.
-    explained_variance : float, above 0, at most 1
-        Share of the variance of the scaled features that is to be kept.
     robust : bool
         As of `LSSVM`.
 
@@ -243,7 +229,6 @@ class TruncatedLSSVM(LinearRegressor):
         "C",
         "rank",
         "selection",
-        "explained_variance",
         "scale",
         "robust",
     )
@@ -253,20 +238,16 @@ class TruncatedLSSVM(LinearRegressor):
     selection: str = "l-curve"
     scale: bool | ArrayLike = True
     fit_intercept: bool = True
-    explained_variance: float = 0.9999
     robust: bool = False
 
     def check(self) -> None:
         """Refuse settings that cannot be, by an InputError that names the setting."""
-        selections = ("l-curve", "gcv", "explained-variance", "full")
+        selections = ("l-curve", "gcv", "full")
         check_choice(self.selection, selections, "selection")
         check_weight(self.C)
         check_scale(self.scale)
         if self.rank is not None:
             check_whole(self.rank, "rank", at_least=1, hint="or None")
-        check_number(
-            self.explained_variance, "explained_variance", above=0.0, at_most=1.0
-        )
         check_flag(self.robust, "robust")
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
@@ -313,29 +294,13 @@ class TruncatedLSSVM(LinearRegressor):
             weights=weights,
         )
 
-    @property
-    def collinear_names_(self) -> tuple[tuple[str, ...], ...]:
-        """`collinear_groups_` by name: that of the table's columns, else x0, x1, ..."""
-        check_is_fitted(self)
-        names = [f"x{i}" for i in range(self.n_features_in_)]
-        names = getattr(self, "feature_names_in_", names)
-        groups = []
-        for group in self.collinear_groups_:
-            own_names = [str(names[i]) for i in group]
-            groups.append(tuple(own_names))
-        return tuple(groups)
-
     def _chosen_rank(self, problem: Decomposition, distinct: int) -> int:
         if self.rank is not None:
             return min(self.rank, distinct)
         if self.selection == "full":
             return distinct
-        if self.selection == "l-curve":
-            return corner_rank(self.l_curve_, problem.n_free)
-        if self.selection == "gcv":
-            return gcv_rank(self.l_curve_, problem.n_free)
-        singular_values = problem.singular_values[:distinct]
-        return variance_rank(singular_values, self.explained_variance)
+        choose = corner_rank if self.selection == "l-curve" else gcv_rank
+        return choose(self.l_curve_, problem.n_free)
 
 
 @dataclass(eq=False, repr=False)

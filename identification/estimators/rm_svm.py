@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import clone
 from sklearn.exceptions import ConvergenceWarning
-from sklearn.linear_model import Ridge
 from sklearn.svm import SVR, LinearSVR
 
 from identification.arrays import column_rms, mean_square, root_mean_square
@@ -59,8 +58,6 @@ class RMSVM(LinearRegressor):
     objective : {"rmse", "correlation"}
         What that search compares of simulated and measured heading; "correlation" as in
         the paper, which is blind to scale and offset.
-    regression : {"svr", "ls-svm"}
-        Epsilon-SVR, or the LS-SVM that the paper's Lagrangian is of, which has no band.
     free_constant : bool
         Whether `identify` leaves the constant unpenalised, as the paper does. By
         default it is penalised like the other terms, so that the weight leads from the
@@ -89,7 +86,6 @@ class RMSVM(LinearRegressor):
         "C",
         "epsilon",
         "objective",
-        "regression",
         "free_constant",
         "folds",
         "constant",
@@ -98,7 +94,6 @@ class RMSVM(LinearRegressor):
     C: float | None = None
     epsilon: float | None = None
     objective: str = "rmse"
-    regression: str = "svr"
     free_constant: bool = False
     constant: int | None = None
     folds: str = TRIALS
@@ -107,8 +102,6 @@ class RMSVM(LinearRegressor):
         """Refuse settings that cannot be, by an InputError that names the setting."""
         objectives = ("rmse", "correlation")
         check_choice(self.objective, objectives, "objective")
-        regressions = ("svr", "ls-svm")
-        check_choice(self.regression, regressions, "regression")
         check_choice(self.folds, FOLDS, "folds")
         check_flag(self.free_constant, "free_constant")
         if self.constant is not None:
@@ -145,20 +138,13 @@ class RMSVM(LinearRegressor):
         if not Z.shape[1]:
             return np.zeros(0), 0.0
 
-        has_offset = self.constant is not None
         band = FIRST_BAND
         if self.epsilon is not None:
             band = float(self.epsilon)
         C = weight / len(e)
-        if self.regression == "ls-svm":
-            solver = Ridge(alpha=1.0 / C, fit_intercept=has_offset)
-        elif has_offset:
-            solver = SVR(kernel="linear", C=C, epsilon=band)
-        else:
-            slopes = _through_zero(Z, e, C=C, band=band)
-            return slopes, 0.0
-
-        solver.fit(Z, e)
+        if self.constant is None:
+            return _through_zero(Z, e, C=C, band=band), 0.0
+        solver = SVR(kernel="linear", C=C, epsilon=band).fit(Z, e)
         slopes = np.asarray(solver.coef_, dtype=float).ravel()
         offset = float(np.sum(solver.intercept_))
         return slopes, offset
@@ -368,8 +354,7 @@ class _Tuner:
         """The insensitive bands, by a pattern search on simulated headings."""
         first = self.first_bands
         asked = self.asked
-        has_no_band = weight == NO_CORRECTION or asked.regression == "ls-svm"
-        if asked.epsilon is not None or has_no_band:
+        if asked.epsilon is not None or weight == NO_CORRECTION:
             return first, None
 
         def error(bands: Floats) -> float:

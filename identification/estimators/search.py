@@ -8,7 +8,6 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shipgym import InputError
 from shipgym.arrays import Floats
 
 LOG_C, BAND = "log10 C", "insensitive band"  # variables of a search
@@ -69,11 +68,6 @@ class Recorder:
     def __call__(self, candidates: Floats) -> Floats:
         """Values of candidates; what is not a number counts as infinitely bad."""
         values = np.array(self.objective(candidates), dtype=float)
-        if values.shape != (len(candidates),):
-            raise InputError(
-                "objective: expected one value for each row of candidates"
-                f" ({len(candidates)}), got values of shape {values.shape}"
-            )
         values[np.isnan(values)] = np.inf
         self.evaluations += len(candidates)
 
@@ -111,13 +105,14 @@ class Optimiser(ABC):
         bounds: ArrayLike,
         seed: int = 0,
     ) -> SearchResult:
-        """Minimise an objective; arguments and errors as of `identification.minimise`.
+        """Minimise an objective; the same seed gives the same search.
 
         The objective gives values, shape (n_candidates,), of candidates of shape
-        (n_candidates, n_dimensions); the bounds have shape (n_dimensions, 2).
+        (n_candidates, n_dimensions); the bounds, finite and the lower one first, have
+        shape (n_dimensions, 2).
         """
         record = Recorder(objective)
-        low, high = check_bounds(bounds)
+        low, high = np.asarray(bounds, dtype=float).T
         self._search(
             record,
             low=low,
@@ -135,25 +130,3 @@ class Optimiser(ABC):
         rng: np.random.Generator,
     ) -> None:
         """Evaluate candidates by `record`, and end each round by its `end_round`."""
-
-
-def check_bounds(bounds: ArrayLike) -> tuple[Floats, Floats]:
-    """Lower and upper bounds, arrays of shape (n_dimensions,)."""
-    try:
-        box = np.asarray(bounds, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(
-            "bounds: expected numbers, a lower and an upper for each dimension, got"
-            f" {bounds!r}"
-        ) from None
-    if box.ndim != 2 or box.shape[1] != 2 or not len(box):
-        raise InputError(
-            "bounds: expected a lower and an upper bound for each dimension, such as"
-            f" [(-2, 12)], got shape {box.shape}"
-        )
-    low, high = box.T
-    if not np.all(np.isfinite(box)) or not np.all(low < high):
-        raise InputError(
-            f"bounds: expected finite numbers, the lower one first, got {box.tolist()}"
-        )
-    return low, high

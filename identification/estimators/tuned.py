@@ -1,6 +1,6 @@
 """LS-SVM that chooses its own weight of the errors."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import clone
 
-from identification.arrays import mean_square
-from identification.estimators.decomposition import check_scale, decompose
+from identification.estimators.decomposition import check_scale
 from identification.estimators.estimator import Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, check_weight, validated
 from identification.estimators.lssvm import LSSVM
@@ -21,13 +20,10 @@ from identification.estimators.objectives import (
     training_error,
 )
 from identification.estimators.optimisers import OPTIMISERS, get_optimiser
-from identification.estimators.search import Optimiser, SearchResult
-from identification.samples.prediction import predict
-from shipgym import InputError, ShipModel, Trial
+from identification.estimators.search import Optimiser
+from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_flag, check_whole
-
-RAN_AWAY = 1e3  # error, relative to the motion, of a ship that ran away
 
 
 @dataclass(eq=False, repr=False)
@@ -41,10 +37,9 @@ class TunedLSSVM(LinearRegressor):
     optimiser : {"abc", "pso", "grid"}, table or Optimiser
         Artificial bee colony, particle swarm or grid; with its settings as
         `{"name": "abc", "rounds": 60}`.
-    objective : {"k-fold", "training", "free-running"}
+    objective : {"k-fold", "training"}
         Error on held-out blocks of time; error on the fitted samples, as in the thesis,
-        whose optimum is the upper bound; error of the simulated trials, slower, but
-        what counts in the end (through `identify` only).
+        whose optimum is the upper bound.
     bounds : tuple of float
         Least and largest C.
     folds : int or "trials"
@@ -108,9 +103,9 @@ class TunedLSSVM(LinearRegressor):
     def check(self) -> None:
         """Refuse settings that cannot be, by an InputError that names the setting."""
         get_optimiser(self.optimiser)
-        objectives = ("k-fold", "training", "free-running")
+        objectives = ("k-fold", "training")
         check_choice(self.objective, objectives, "objective")
-        self.log_bounds()
+        self._log_bounds()
         check_folds(self.folds)
         check_whole(self.seed, "seed", at_least=0)
         check_scale(self.scale)
@@ -124,21 +119,27 @@ class TunedLSSVM(LinearRegressor):
         folds="trials".
         """
         self.check()
-        if self.objective == "free-running":
-            raise InputError(
-                "objective: expected 'k-fold' or 'training', got 'free-running', but"
-                " samples alone cannot be simulated; give the estimator to identify"
-            )
         features, targets = validated(self, X, y)
-        optimiser = get_optimiser(self.optimiser)
-        search = optimiser.minimise(
+        search = get_optimiser(self.optimiser).minimise(
             self._objective(features, targets, groups),
-            bounds=[self.log_bounds()],
+            bounds=[self._log_bounds()],
             seed=self.seed,
         )
-        return self.fit_with(features, targets, search)
+        self.C_ = 10.0 ** float(search.x[0])
+        self.search_ = search
+        self.chosen_ = {
+            "C": self.C_,
+            "objective": self.objective,
+            "value": search.value,
+            "evaluations": search.evaluations,
+        }
+        fitted = self._estimator(self.C_).fit(features, targets)
+        for name, value in vars(fitted).items():
+            if name.endswith("_"):
+                setattr(self, name, value)
+        return self
 
-    def log_bounds(self) -> tuple[float, float]:
+    def _log_bounds(self) -> tuple[float, float]:
         """Bounds of log10 C, checked."""
         try:
             low, high = self.bounds
@@ -156,23 +157,6 @@ class TunedLSSVM(LinearRegressor):
             )
         return float(np.log10(low)), float(np.log10(high))
 
-    def fit_with(self, X: ArrayLike, y: ArrayLike, search: SearchResult) -> Self:
-        """Fit with the C that a search found."""
-        features, targets = validated(self, X, y)
-        self.C_ = 10.0 ** float(search.x[0])
-        self.search_ = search
-        self.chosen_ = {
-            "C": self.C_,
-            "objective": self.objective,
-            "value": search.value,
-            "evaluations": search.evaluations,
-        }
-        fitted = self._estimator(self.C_).fit(features, targets)
-        for name, value in vars(fitted).items():
-            if name.endswith("_"):
-                setattr(self, name, value)
-        return self
-
     def _estimator(self, C: float) -> LSSVM:
         return LSSVM(
             C=C,
@@ -184,7 +168,7 @@ class TunedLSSVM(LinearRegressor):
     def _objective(self, X: Floats, y: Floats, groups: ArrayLike | None) -> ErrorOfC:
         weights = None
         if self.robust:
-            _, largest = self.log_bounds()
+            _, largest = self._log_bounds()
             weights = self._estimator(10.0**largest).fit(X, y).weights_
         if self.objective == "training":
             return training_error(
@@ -209,83 +193,10 @@ class TunedLSSVM(LinearRegressor):
         )
 
     def fit_equations(self, task: FitTask) -> Estimators:
-        """Copies fitted to all equations; trials may be blocks, or be simulated."""
-        if self.objective == "free-running":
-            return _fit_free_running(self, task)
+        """Copies fitted to all equations; trials may be blocks."""
         samples = task.samples
         found: Estimators = {}
         for q, X, y in samples.by_equation():
             own = clone(self)
             found[q] = own.fit(X, y, groups=samples.trial)
         return found
-
-
-def free_running_error(model: ShipModel, trials: Sequence[Trial]) -> float:
-    """Mean squared error of open-loop predictions, by the variance of each channel.
-
-    0 for a perfect model, 1 for one that predicts the mean; 1e3 for each trial that ran
-    away.
-    """
-    errors = []
-    for trial in trials:
-        error = RAN_AWAY
-        predicted = predict(model, trial)
-        if predicted is not None:
-            error = min(_relative_error(predicted, trial), RAN_AWAY)
-        errors.append(error)
-    return float(np.mean(errors))
-
-
-def _relative_error(predicted: Trial, trial: Trial) -> float:
-    """Mean squared error of the velocities by their variance, where they vary."""
-    ratios = []
-    for channel in ("u", "v", "r"):
-        measured = trial[channel]
-        if np.ptp(measured) > 0.0:
-            errors = predicted[channel] - measured
-            ratio = mean_square(errors) / np.var(measured)
-            ratios.append(ratio)
-    return float(np.mean(ratios))
-
-
-def _fit_free_running(settings: TunedLSSVM, task: FitTask) -> Estimators:
-    """Estimators of all equations, their C chosen by the error of simulated trials.
-
-    The variables of their common search are log10 C in the order of the equations.
-    """
-    settings.check()
-    samples = task.samples
-    decomposed = {}
-    for q, X, y in samples.by_equation():
-        decomposed[q] = decompose(
-            X,
-            y=y,
-            scale=settings.scale,
-            fit_intercept=settings.fit_intercept,
-        )
-
-    def error(log_c: Floats) -> float:
-        accelerations = {}
-        for (q, problem), exponent in zip(decomposed.items(), log_c, strict=True):
-            n_directions = len(problem.singular_values)
-            filters = problem.filters(10.0**exponent, n_directions)
-            accelerations[q] = problem.coefficients(filters)
-        model = task.blank.with_accelerations(accelerations)
-        return free_running_error(model, task.trials)
-
-    def errors(candidates: Floats) -> Floats:
-        return np.array([error(log_c) for log_c in candidates])
-
-    bounds = [settings.log_bounds()] * len(decomposed)
-    optimiser = get_optimiser(settings.optimiser)
-    search = optimiser.minimise(
-        errors,
-        bounds=bounds,
-        seed=settings.seed,
-    )
-
-    found: Estimators = {}
-    for k, (q, X, y) in enumerate(samples.by_equation()):
-        own = clone(settings)
-        found[q] = own.fit_with(X, y, search.of(k))
-    return found

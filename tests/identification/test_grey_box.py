@@ -151,31 +151,25 @@ def test_pattern_search_finds_the_corner_and_the_inside() -> None:
 
 
 def test_the_correction_passes_the_battery_of_scikit_learn() -> None:
-    for estimator in (RMSVM(C=10.0), RMSVM(C=10.0, regression="ls-svm")):
+    for estimator in (RMSVM(C=10.0), RMSVM(C=10.0, epsilon=0.0)):
         checks = check_estimator(estimator, on_skip=None, on_fail=None)
         assert [
             (c["check_name"], c["exception"]) for c in checks if c["status"] == "failed"
         ] == []
 
 
-@pytest.mark.parametrize("regression", ["svr", "ls-svm"])
-def test_a_weak_regularisation_finds_a_linear_law(regression: str) -> None:
+def test_a_weak_regularisation_finds_a_linear_law() -> None:
     rng = np.random.default_rng(0)
     X = np.column_stack([rng.standard_normal((200, 2)) * [1.0, 1e-3], np.ones(200)])
-    estimator = RMSVM(C=1e6, epsilon=0.0, constant=2, regression=regression).fit(
-        X, X @ [2.0, -500.0, 0.3]
-    )
+    estimator = RMSVM(C=1e6, epsilon=0.0, constant=2).fit(X, X @ [2.0, -500.0, 0.3])
     assert estimator.coef_ == pytest.approx([2.0, -500.0, 0.3], rel=1e-3)
-    free = RMSVM(C=1e6, epsilon=0.0, regression=regression).fit(
-        X[:, :2], X[:, :2] @ [2.0, -500.0]
-    )
+    free = RMSVM(C=1e6, epsilon=0.0).fit(X[:, :2], X[:, :2] @ [2.0, -500.0])
     assert free.coef_ == pytest.approx([2.0, -500.0], rel=1e-3)
 
 
-@pytest.mark.parametrize("regression", ["svr", "ls-svm"])
-def test_a_feature_that_is_zero_throughout_gets_no_correction(regression: str) -> None:
+def test_a_feature_that_is_zero_throughout_gets_no_correction() -> None:
     X = np.column_stack([np.random.default_rng(0).standard_normal(200), np.zeros(200)])
-    estimator = RMSVM(C=1e6, epsilon=0.0, regression=regression).fit(X, 2.0 * X[:, 0])
+    estimator = RMSVM(C=1e6, epsilon=0.0).fit(X, 2.0 * X[:, 0])
     assert estimator.coef_ == pytest.approx([2.0, 0.0], rel=1e-3)
 
 
@@ -226,7 +220,7 @@ def test_the_weight_may_be_judged_by_the_largest_rudder(
     target: ShipModel, trials: list[Trial]
 ) -> None:
     """No lesser weight predicts the 20/20 from the 10/10s within a tenth as well."""
-    by_largest = RMSVM(regression="ls-svm", folds="largest-rudder")
+    by_largest = RMSVM(epsilon=0.1, folds="largest-rudder")
     chosen = fit(target, trials, method=by_largest, reference_model="tanker")
     least = (chosen.model.provenance or {})["search"]["r"]["C"]
 
@@ -234,7 +228,7 @@ def test_the_weight_may_be_judged_by_the_largest_rudder(
         learnt = fit(
             target,
             trials,
-            method=RMSVM(C=weight, regression="ls-svm"),
+            method=RMSVM(C=weight, epsilon=0.1),
             reference_model="tanker",
             hold_out=["starboard-20"],
         )
@@ -285,31 +279,6 @@ def test_the_largest_rudder_needs_a_smaller_one(trials: list[Trial]) -> None:
         match=r"folds: expected some trials with less rudder .* reach 20 deg",
     ):
         of_largest_rudder(trials[2:], "folds")
-
-
-def test_a_free_constant_is_not_penalised(
-    target: ShipModel, trials: list[Trial]
-) -> None:
-    """Of a weight that leaves no other correction the constant keeps the mean."""
-    bound, free = (
-        fit(
-            target,
-            trials,
-            method=RMSVM(C=1e-12, regression="ls-svm", free_constant=is_free),
-            reference_model="kvlcc2",
-        ).model
-        for is_free in (False, True)
-    )
-    constants = {
-        name
-        for q in free.table.equations
-        for name, term in zip(free.table.names(q), free.table.terms(q), strict=True)
-        if term.name == "0"
-    }
-    assert constants
-    for name, value in free.coefficients.items():
-        assert bound.coefficients[name] == pytest.approx(0.0, abs=1e-9)
-        assert (abs(value) > 1e-6) is (name in constants)
 
 
 def test_what_was_chosen_is_told(rm_svm: IdentificationResult) -> None:
@@ -387,7 +356,6 @@ def test_the_exact_reference_leaves_nothing_to_learn(
         ("grey-box", RMSVM(C=-1.0), "tanker", "C: "),
         ("grey-box", RMSVM(epsilon=-1.0), "tanker", "epsilon: "),
         ("grey-box", RMSVM(objective="luck"), "tanker", r"objective: .*'luck'"),
-        ("grey-box", RMSVM(regression="luck"), "tanker", r"regression: .*'luck'"),
         ("grey-box", RMSVM(folds="luck"), "tanker", r"folds: .*'luck'"),
     ],
 )
@@ -444,7 +412,6 @@ def test_bands_are_searched_for_only_where_none_is_given(
     for method in (
         RMSVM(C=1.0, epsilon=0.3),
         RMSVM(C=0.0),
-        RMSVM(C=1.0, regression="ls-svm"),
     ):
         result = fit(target, trials, method=method, reference_model="kvlcc2")
         assert result.searches == {}
