@@ -43,11 +43,14 @@ from .estimators.rm_svm import RMSVM as RMSVM
 from .estimators.search import SearchResult as SearchResult
 from .estimators.tuned import TunedLSSVM as TunedLSSVM
 from .judging.uncertainty import Uncertainty as Uncertainty
-from .models.coefficient_history import (
-    CoefficientHistory as CoefficientHistory,
+from .models.forces import (
+    ForceRegression as ForceRegression,
 )
-from .models.coefficient_history import (
-    coefficient_history as coefficient_history,
+from .models.forces import (
+    force_regression as force_regression,
+)
+from .models.forces import (
+    identify_forces as identify_forces,
 )
 from .models.prior_knowledge import PriorKnowledge as PriorKnowledge
 from .models.refinement import Refinement as Refinement
@@ -65,15 +68,6 @@ from .pipeline.options import Options as Options
 from .pipeline.result import IdentificationResult as IdentificationResult
 from .report.figures import plots as plots
 from .report.page import write_report as write_report
-from .samples.forces import (
-    ForceRegression as ForceRegression,
-)
-from .samples.forces import (
-    force_regression as force_regression,
-)
-from .samples.forces import (
-    identify_forces as identify_forces,
-)
 from .samples.prediction import predict as predict
 from .samples.preprocess import Preprocessing as Preprocessing
 from .samples.samples import Samples as Samples

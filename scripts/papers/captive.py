@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.samples.forces import rigid_body_forces
+from identification.models.forces import rigid_body_forces
 from shipgym.arrays import integral
 from shipgym.models import ShipModel
 from shipgym.ships.inertia import inertia, rigid_inertia

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from identification.estimators.recursive import MultiInnovationLeastSquares
-from identification.models.coefficient_history import coefficient_history
 from identification.samples.prediction import predict
 from papers import (
     cao2015,
@@ -21,6 +20,7 @@ from papers import (
     song2020_nomoto,
     xu2020_rank,
 )
+from papers.coefficient_history import coefficient_history
 from papers.zhu2018 import (
     container_ship,
     fits,
@@ -162,7 +162,7 @@ def nomoto(axes: Any) -> None:
     """K and T sample by sample."""
     run, names = song2020_nomoto.trial("nomoto"), tuple(song2020_nomoto.TRUTH["nomoto"])
     X, y = song2020_nomoto.regression("nomoto", run)
-    least = coefficient_history(
+    times, history = coefficient_history(
         run, "nomoto", song2020_nomoto.PARTICULARS, MultiInnovationLeastSquares()
     )
     paths = {
@@ -172,7 +172,7 @@ def nomoto(axes: Any) -> None:
             song2020.gradient_history(X, y, omega=song2020_nomoto.OMEGA)[0],
             THEIRS,
         ),
-        "TMILS": (least.t, np.column_stack([least[name] for name in names]), OURS),
+        "TMILS": (times, np.column_stack([history[name] for name in names]), OURS),
         "extended Kalman filter, noise": (
             run.t,
             comparators.nomoto_history("nomoto"),

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimators.recursive import MultiInnovationLeastSquares
-from identification.models.coefficient_history import coefficient_history
 from identification.pipeline import identify
+from papers.coefficient_history import coefficient_history
 from papers.row import Conclusion, Paper, Row
 from papers.song2020_container import container_rows
 from papers.song2020_nomoto import (
@@ -129,9 +129,10 @@ def at_best(structure: str, noisy: bool = False) -> dict[str, float]:
                 rudder_bias="none",
             ).coefficients
         )
-    return coefficient_history(
+    _, history = coefficient_history(
         run, structure, PARTICULARS, MultiInnovationLeastSquares(omega=OMEGA)
-    ).last
+    )
+    return {name: float(values[-1]) for name, values in history.items()}
 
 
 def index_rows(

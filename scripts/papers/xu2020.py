@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from identification.design.reduction import Reduction
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
-from identification.samples.forces import (
+from identification.models.forces import (
     FORCES,
     ForceRegression,
     fit_forces,

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.design.reduction import Reduction, backward_elimination
-from identification.samples.forces import FORCES, ForceRegression, force_regression
+from identification.models.forces import FORCES, ForceRegression, force_regression
 from papers.captive import oscillate
 from shipgym.models import ShipModel
 from shipgym.ships import get_structure

@@ -2,7 +2,7 @@
 
 81 steady conditions of drift, rudder and propeller loading, without yaw or
 acceleration: what they tell is the hull's response to drift and the rudder's force, not
-inertia or damping of yaw, so the tables of `identification.samples.forces`, which
+inertia or damping of yaw, so the tables of `identification.models.forces`, which
 begin with inertia, do not apply; the estimator and the reduction do.
 """
 

@@ -12,7 +12,7 @@ from papers.xu2020_tank import PMM18, PMM38, TABLE_11, xu_ship
 
 import shipgym
 from identification import identify
-from identification.samples.forces import (
+from identification.models.forces import (
     ForceRegression,
     between_jumps,
     force_regression,
