@@ -9,9 +9,14 @@ import numpy as np
 
 from identification.arrays import by_name
 from identification.judging.coarsened import CoarsenedPosterior
-from identification.judging.ensemble import Chains, LogDensity, sample_ensemble
-from identification.judging.mixing import Mixing, mixing_of
 from identification.judging.model_error import FEWEST_TRIALS, model_error
+from identification.judging.sampling import (
+    Chains,
+    LogDensity,
+    Mixing,
+    mixing_of,
+    sample,
+)
 from identification.judging.uncertainty import Uncertainty
 from identification.models.coefficient_prior import CoefficientPrior
 from identification.models.whole_trials import WholeTrials
@@ -107,7 +112,8 @@ def with_posterior(
     if not mixing.is_enough:
         remarks.append(_not_mixed(mixing))
     else:
-        model = _with_draws(model, prior, chains.flat, asked.seed)
+        points = chains.points.reshape(-1, prior.n_parameters)
+        model = _with_draws(model, prior, points, asked.seed)
     return model, {
         "kept": mixing.is_enough,
         "prior": prior.source,
@@ -171,15 +177,10 @@ def _chains(posterior: CoarsenedPosterior, start: Floats, asked: Uncertainty) ->
         return posterior.log_density(shape.points(coordinates))
 
     rng = np.random.default_rng(asked.seed)
-    chains = sample_ensemble(
-        log_density,
-        _walkers(log_density, len(start), rng),
-        steps=asked.steps,
-        warm_up=asked.steps // 2,
-        seed=asked.seed,
-    )
-    points = shape.points(chains.flat)
-    return replace(chains, points=points.reshape(chains.points.shape))
+    walkers = _walkers(log_density, len(start), rng)
+    chains = sample(log_density, walkers, asked.steps, asked.seed)
+    points = shape.points(chains.points.reshape(-1, len(start)))
+    return chains._replace(points=points.reshape(chains.points.shape))
 
 
 def _with_draws(
