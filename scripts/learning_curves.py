@@ -27,8 +27,12 @@ from agents.controllers.los_autopilot import LineOfSight
 from agents.controllers.lq import LQ
 from agents.rollouts.rollout import rollout
 from agents.training.evaluation import HeldOut
-from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS
-from agents.training.request import TrainingRequest, make_plan
+from agents.training.plan import (
+    EVALUATION_SEED,
+    N_EVALUATIONS,
+    TrainingRequest,
+    make_plan,
+)
 from agents.training.training import train
 from shipgym.envs.engine import Engine
 from shipgym.files import make_folder, read_json, write_json

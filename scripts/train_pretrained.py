@@ -30,8 +30,8 @@ from agents.benchmarking.statistics import ConfidenceInterval, Draws, gain_over
 from agents.policies.policy import LearnedPolicy
 from agents.suites.suite import SETS, BenchmarkTask, find_task, load_suite
 from agents.training import run_folder
-from agents.training.request import TrainingRequest, make_plan
-from agents.training.result import TrainingProgress
+from agents.training.evaluation import TrainingProgress
+from agents.training.plan import TrainingRequest, make_plan
 from agents.training.training import train
 from shipgym.files import read_json, write_json
 

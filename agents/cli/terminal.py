@@ -13,7 +13,7 @@ from rich.segment import Segment
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from agents.training.result import TrainingProgress
+    from agents.training.evaluation import TrainingProgress
     from identification.progress import Progress
 
 #: Control characters but tab and newline, and those that turn the direction of writing.

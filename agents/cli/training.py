@@ -24,9 +24,8 @@ from agents.cli.parameters import with_options
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from agents.training.evaluation import TrainingResult
     from agents.training.plan import TrainingPlan
-    from agents.training.request import TrainingRequest
-    from agents.training.result import TrainingResult
     from agents.training.tuning import TuningResult, TuningTrial
 
 Algorithm = Annotated[str, Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")]
@@ -48,7 +47,8 @@ TaskName = Annotated[
     str | None, Option(help="A benchmark task, instead of --env, --model and --sea.")
 ]
 SuiteName = Annotated[
-    str, Option(help="Suite of the task: a name, or the TOML file of your own.")
+    str | None,
+    Option(help="Suite of the task, a name or your TOML file; default: shipgym-v1."),
 ]
 EnvironmentOptions = Annotated[
     list[str] | None,
@@ -94,7 +94,7 @@ def learning_options(
     model: Model = None,
     sea: Sea = None,
     task: TaskName = None,
-    suite: SuiteName = "shipgym-v1",
+    suite: SuiteName = None,
     allow_code: AllowCode = None,
     environment_options: EnvironmentOptions = None,
     total_steps: TotalSteps = None,
@@ -102,23 +102,24 @@ def learning_options(
     set_: Setting = None,
     randomise: Randomise = None,
 ) -> dict[str, Any]:
-    """Fields of a `TrainingRequest` that are options of `train` and `tune`."""
+    """Fields of a `TrainingRequest` that `train` and `tune` are given."""
     overrides = _named(set_, "--set")
     if total_steps is not None:
         overrides["total_steps"] = total_steps
-    return {
+    fields = {
         "algorithm": algorithm,
         "environment": env,
         "model": model,
         "sea": sea,
         "task": task,
+        "suite": suite,
         "options": _named(environment_options, "--option"),
         "settings_file": settings,
         "settings": overrides,
         "randomise": randomise,
-        "suite": suite,
-        "allow_code": allow_code or (),
+        "allow_code": allow_code,
     }
+    return {name: value for name, value in fields.items() if value is not None}
 
 
 with_learning_options = with_options(learning_options, "fields")
@@ -130,7 +131,11 @@ def train_command(
     *,
     fields: dict[str, Any],
     from_nothing: Annotated[
-        bool, Option("--from-nothing", help="Without a base: --set base=none.")
+        bool,
+        Option(
+            "--from-nothing",
+            help="Learn from scratch, without a base controller (--set base=none).",
+        ),
     ] = False,
     seed: Annotated[
         int | None, Option(min=0, max=799, help="Random seed; default: 0.")
@@ -149,17 +154,16 @@ def train_command(
 
     Writes policy, learning curve and checkpoints.
 
-    A run killed at any moment resumes with --resume from its last checkpoint, at most a
-    minute old, and ends as if it had never stopped. With --resume, options that are not
-    given keep their values; others must be the same.
+    A run killed at any moment resumes with --resume from its last save, about a minute
+    old at most. With --resume, options that are not given keep their values; others
+    must be the same.
     """
-    from agents.training.request import TrainingRequest
-
     if from_nothing:
         fields["settings"]["base"] = "none"
-    request = TrainingRequest(**fields, seed=seed, threads=threads)
-    result = _train(request, out, resume, max_seconds)
-    _print_result(result, out)
+    more = {"seed": seed, "threads": threads}
+    fields |= {name: value for name, value in more.items() if value is not None}
+    plan = _checked_plan(fields, out, resume)
+    _print_result(_train(plan, out, resume, max_seconds), out)
 
 
 def _named(texts: list[str] | None, option: str) -> dict[str, Any]:
@@ -169,14 +173,34 @@ def _named(texts: list[str] | None, option: str) -> dict[str, Any]:
     return named_values(texts or (), option, "gamma=0.98")
 
 
+def _checked_plan(fields: dict[str, Any], out: Path, resume: bool) -> TrainingPlan:
+    """Plan of a new or a resumed run, before anything is written."""
+    from agents.cli.terminal import warn
+    from agents.training import run_folder
+    from agents.training.plan import TrainingRequest, make_plan
+
+    if resume:
+        plan = make_plan(run_folder.resumed(out, fields))
+        run_folder.check_resumable(out, plan)
+    else:
+        run_folder.check_new(out)
+        plan = make_plan(TrainingRequest(**fields))
+
+    steps = fields["settings"].get("total_steps", 0)
+    rollout = plan.settings.rollout
+    if steps % rollout:
+        rounded = -(-steps // rollout) * rollout
+        warn(
+            f"total_steps: {steps:,} is rounded up to {rounded:,}: a rollout of all"
+            f" ships has {rollout:,} steps"
+        )
+    return plan
+
+
 def _train(
-    request: TrainingRequest, out: Path, resume: bool, max_seconds: float | None
+    plan: TrainingPlan, out: Path, resume: bool, max_seconds: float | None
 ) -> TrainingResult:
-    """Check the request before torch is imported or anything is written; train."""
     from agents.cli.terminal import training_bar
-
-    plan = _checked_plan(request, out, resume)
-
     from agents.training.run_folder import CHECKPOINT
     from agents.training.training import train
 
@@ -195,35 +219,6 @@ def _train(
         if (out / CHECKPOINT).is_file():
             message += f"; continue with --resume --out {out}"
         fail(message, INTERRUPTED)
-
-
-def _checked_plan(request: TrainingRequest, out: Path, resume: bool) -> TrainingPlan:
-    """Plan of a new or a resumed run, with warnings of what differs."""
-    from agents.cli.terminal import warn
-    from agents.training import run_folder
-    from agents.training.request import make_plan
-
-    if resume:
-        plan = make_plan(request, run_folder.read_plan(out, request))
-        run_folder.check_resumable(out, plan)
-        for line in run_folder.other_versions(out):
-            warn(
-                f"the run began with other versions: {line}; the result may differ in"
-                " the last digits"
-            )
-    else:
-        run_folder.check_new(out)
-        plan = make_plan(request)
-
-    steps = request.settings.get("total_steps", 0)
-    rollout = getattr(plan.settings, "rollout", 1)
-    if steps % rollout:
-        rounded = -(-steps // rollout) * rollout
-        warn(
-            f"total_steps: {steps:,} is rounded up to {rounded:,}: a rollout of all"
-            f" ships has {rollout:,} steps"
-        )
-    return plan
 
 
 def _print_result(result: TrainingResult, out: Path) -> None:
@@ -274,25 +269,25 @@ def tune_command(
 
     Uses Optuna; writes them for `train --settings`.
 
-    Four trials are proposed at a time, so more than four workers are of no use. If it
-    is killed, the same command continues with the trials that are not done.
+    If it is killed, the same command continues with the trials that are not done.
     """
     from agents.cli.terminal import progress_bars
     from agents.jobs import JobEngine
-    from agents.training.request import TrainingRequest, make_plan
-    from agents.training.tuning import evaluated_evenly, tune
+    from agents.training.plan import TrainingRequest, make_plan
+    from agents.training.tuning import tune
 
     fixed = sorted(fields["settings"].keys() - {"total_steps"})
-    request = TrainingRequest(**fields, seed=seed, threads=1)
-    where = JobEngine(engine, workers, address)
-    plan = make_plan(request)
+    plan = make_plan(TrainingRequest(**fields, seed=seed))
     if "evaluate_every" not in fixed:
-        plan = evaluated_evenly(plan)
+        # ten evaluations on the way, which early stopping needs
+        every = max(1, plan.settings.total_steps // 10)
+        fields["settings"]["evaluate_every"] = every
+        plan = make_plan(TrainingRequest(**fields, seed=seed))
 
     try:
         with progress_bars() as bars:
 
-            def on_progress(done: int, total: int, best: float | None) -> None:
+            def on_progress(done: int, total: int) -> None:
                 if bars is not None:
                     bars("trials", done, total)
 
@@ -301,7 +296,7 @@ def tune_command(
                 out,
                 trials,
                 fixed=fixed,
-                where=where,
+                where=JobEngine(engine, workers, address),
                 on_progress=on_progress,
             )
     except KeyboardInterrupt:

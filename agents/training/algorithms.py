@@ -1,7 +1,7 @@
 """Agents of stable-baselines3 and sb3-contrib, and the ships that they learn from."""
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import torch
@@ -15,7 +15,7 @@ from agents.policies.policy import NO_LIMIT
 from agents.training.plan import TrainingPlan, training_options
 from agents.training.residual import ResidualVecEnv
 from agents.training.settings import (
-    GradientSettings,
+    LearningSettings,
     OffPolicySettings,
     PPOSettings,
     SACSettings,
@@ -45,7 +45,7 @@ class StaggeredShips(ShipVecEnv):
 
 def make_ships(plan: TrainingPlan, base: Controller | None) -> VecEnv:
     """Make the ships that a plan's agent learns from, as it sees and steers them."""
-    settings = gradient_settings(plan)
+    settings = plan.settings
     ships: VecEnv = StaggeredShips(
         plan.task.env_id,
         settings.ships,
@@ -71,12 +71,7 @@ def make_ships(plan: TrainingPlan, base: Controller | None) -> VecEnv:
     return scaled_rewards(ships, settings)
 
 
-def gradient_settings(plan: TrainingPlan) -> GradientSettings:
-    """Settings of a plan whose algorithm learns by gradients."""
-    return cast(GradientSettings, plan.settings)
-
-
-def scaled_rewards(ships: VecEnv, settings: GradientSettings) -> VecEnv:
+def scaled_rewards(ships: VecEnv, settings: LearningSettings) -> VecEnv:
     """Scale rewards as the settings say; observations are scaled as they are."""
     scaled = VecNormalize(ships, norm_obs=False, gamma=settings.gamma)
     scale = settings.reward_scale
@@ -93,7 +88,7 @@ def make_agent(plan: TrainingPlan, base: Controller | None) -> Any:
     `base` is the controller that it adds to. The agent's seed is also that of the
     ships; the random numbers start again.
     """
-    settings = gradient_settings(plan)
+    settings = plan.settings
     ships = make_ships(plan, base)
     algorithm = algorithm_class(plan.algorithm)
     agent = algorithm(
@@ -125,7 +120,7 @@ def begin_as_base(agent: Any) -> None:
 
 
 def sb3_arguments(
-    settings: GradientSettings, action_shape: tuple[int, ...] = (1,)
+    settings: LearningSettings, action_shape: tuple[int, ...] = (1,)
 ) -> dict[str, Any]:
     """Keywords of the algorithm's class in stable-baselines3 or sb3-contrib.
 
@@ -157,7 +152,7 @@ def sb3_arguments(
     }
 
 
-def _network(settings: GradientSettings) -> dict[str, Any]:
+def _network(settings: LearningSettings) -> dict[str, Any]:
     """Keywords of the policy's class."""
     activations = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
     network: dict[str, Any] = {
@@ -179,7 +174,7 @@ def _network(settings: GradientSettings) -> dict[str, Any]:
     return network
 
 
-def _rate(settings: GradientSettings) -> float | Callable[[float], float]:
+def _rate(settings: LearningSettings) -> float | Callable[[float], float]:
     """Learning rate by the part of the training that is left."""
     if settings.schedule == "constant":
         return settings.learning_rate
@@ -191,7 +186,7 @@ def _rate(settings: GradientSettings) -> float | Callable[[float], float]:
     return falling
 
 
-def set_deviation(agent: Any, settings: GradientSettings) -> None:
+def set_deviation(agent: Any, settings: LearningSettings) -> None:
     """Set PPO's exploration for this stage of the training, unless it is learned."""
     if not isinstance(settings, PPOSettings) or settings.log_std_end == "learned":
         return

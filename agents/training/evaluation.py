@@ -1,16 +1,18 @@
-"""Evaluation of a policy that learns: episodes held out, and what was found on them."""
+"""Evaluation of a policy that learns: episodes held out, progress and result."""
 
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from agents.controllers.designs import design
 from agents.controllers.interface import Policy, check_fits
+from agents.policies.policy import LearnedPolicy
 from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask
-from agents.training.likeness import check_like, list_of, optional_number
+from agents.training.plan import TrainingPlan
 from shipgym.errors import InputError
 
 
@@ -26,84 +28,74 @@ class HeldOut:
     ) -> None:
         self.engine = task.engine(number, threads=threads)
         self.seeds = first + np.arange(number)
-        self.lq_cost = self._cost_of_lq(task)
+        self.lq_cost: float | None = None
+        if task.task.action == "rudder":
+            with suppress(InputError):
+                lq = design("lq", task)
+                check_fits(lq, task.task, task.ship, "lq")
+                self.lq_cost = self.cost(lq)
 
     def cost(self, policy: Policy) -> float:
         """Mean cost of a policy."""
         return float(episode_costs(policy, self.engine, self.seeds).mean())
 
-    def _cost_of_lq(self, task: BenchmarkTask) -> float | None:
-        if task.task.action != "rudder":
+
+class TrainingProgress(NamedTuple):
+    """Progress of a training."""
+
+    #: decisions learned from, and to learn from
+    steps: int
+    total: int
+    seconds: float  # spent so far, also before it was resumed
+    #: mean cost of the episodes held out, at the last evaluation, at the best one, and
+    #: of LQ
+    cost: float | None
+    best_cost: float | None
+    lq_cost: float | None
+    evaluated: bool = False  # there is a new evaluation
+
+
+@dataclass(frozen=True)
+class TrainingResult:
+    """The result of a training."""
+
+    plan: TrainingPlan
+    policy: LearnedPolicy  # the best one
+    #: evaluations: steps, seconds, cost on the episodes held out, mean return of those
+    #: learned from
+    curve: tuple[Mapping[str, Any], ...]
+    # mean cost of the policy on the episodes held out, which it was chosen by
+    best_cost: float
+    #: when the policy was found, and when the training ended
+    best_steps: int
+    steps: int
+    lq_cost: float | None  # of LQ on the same episodes
+    seconds: float  # of training and evaluation, also before it was resumed
+    finished: bool  # false where the time was up before
+    resumed_from: int | None  # steps of the checkpoint that it went on from
+
+    @property
+    def lq_reached(self) -> Mapping[str, Any] | None:
+        """First evaluation that cost no more than LQ, to a thousandth, if any.
+
+        A network that has learned nothing yet adds nearly nothing to its base.
+        """
+        if self.lq_cost is None:
             return None
-        lq = None
-        with suppress(InputError):
-            designed = design("lq", task)
-            check_fits(designed, task.task, task.ship, "lq")
-            lq = designed
-        return None if lq is None else self.cost(lq)
-
-
-@dataclass
-class Evaluations:
-    """Evaluations of a training so far, and the best of them.
-
-    An entry of the `curve` has steps, seconds, the mean cost held out and the mean
-    return of the episodes learned from.
-    """
-
-    best_cost: float | None = None
-    best_steps: int = 0
-    curve: list[dict[str, Any]] = field(default_factory=list)
-
-    def add(
-        self, steps: int, seconds: float, cost: float, mean_return: float | None
-    ) -> bool:
-        """Add an evaluation; return whether it is the best one."""
-        self.curve.append(
-            {
-                "steps": steps,
-                "seconds": seconds,
-                "cost": cost,
-                "mean_return": mean_return,
-            }
-        )
-        best = self.best_cost is None or cost < self.best_cost
-        if best:
-            self.best_cost = cost
-            self.best_steps = steps
-        return best
-
-    @property
-    def last_steps(self) -> int | None:
-        """Steps of the last evaluation."""
-        return self.curve[-1]["steps"] if self.curve else None
-
-    @property
-    def last_cost(self) -> float | None:
-        """Cost of the last evaluation."""
-        return self.curve[-1]["cost"] if self.curve else None
-
-    def due(self, steps: int, every: int) -> bool:
-        """Return whether the steps are in another stretch than the last evaluation."""
-        return self.last_steps is None or steps // every > self.last_steps // every
+        reached = 1.001 * self.lq_cost
+        return next((one for one in self.curve if one["cost"] <= reached), None)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the evaluations ready for JSON."""
-        return asdict(self)
-
-
-def check_evaluations(run: Any) -> None:
-    """Raise ValueError unless this is a training's record of its evaluations."""
-    evaluation = {
-        "steps": 0,
-        "seconds": 0.0,
-        "cost": 0.0,
-        "mean_return": optional_number,
-    }
-    own = {
-        "best_cost": optional_number,
-        "best_steps": 0,
-        "curve": list_of(evaluation),
-        "seconds": 0.0,
-    }
-    check_like(run, own, "run")
+        """Return the result for programs."""
+        return {
+            "configuration": self.plan.configuration(),
+            "steps": self.steps,
+            "finished": self.finished,
+            "resumed_from": self.resumed_from,
+            "seconds": self.seconds,
+            "best_cost": self.best_cost,
+            "best_steps": self.best_steps,
+            "lq_cost": self.lq_cost,
+            "lq_reached": self.lq_reached,
+            "curve": list(self.curve),
+        }

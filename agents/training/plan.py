@@ -1,24 +1,32 @@
-"""Plan of a training: algorithm, task, settings and seed."""
+"""What a user asks to be trained, and the plan that is made of it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Self
 
 from agents.controllers.interface import model_hash
 from agents.policies.policy import OUTPUTS
 from agents.policies.weights_file import as_json
-from agents.suites.suite import BenchmarkTask
+from agents.suites.environments import SHORT_NAMES, read_environment
+from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, find_task
 from agents.training.settings import (
     SEEDS_EACH,
-    GradientSettings,
     LearningSettings,
-    make_settings,
+    load_settings,
+    read_settings_file,
     settings_of,
 )
-from shipgym import ShipModel
-from shipgym.checks import check_choice, check_keys, check_whole
+from shipgym.checks import (
+    check_choice,
+    check_keys,
+    check_table,
+    check_text,
+    check_whole,
+)
 from shipgym.errors import InputError
+from shipgym.models import ShipModel
 from shipgym.sea.conditions import Weather, as_weather
 from shipgym.sea.weather_column import weather_column
 from shipgym.tasks.task import Task
@@ -30,43 +38,124 @@ N_EVALUATIONS = 100
 
 
 @dataclass(frozen=True)
-class TrainingPlan:
-    """Settings of a training that determine its result.
-
-    Raises InputError for settings of another algorithm, commands that are not
-    continuous, or a value out of its range.
+class TrainingRequest:
+    """Training that a user asks for.
 
     Attributes
     ----------
     algorithm : {"ppo", "sac", "td3", "tqc"}
-    task : BenchmarkTask
-        Environment, model and options; evaluation is on it as it is.
-    settings : LearningSettings
-        Of the algorithm.
+    environment : str
+        As `read_environment` takes it; by default course keeping.
+    model : str
+        Name or file of a model; by default the Mariner.
+    sea : str
+        Sea state.
+    task : str
+        Task of a suite, in place of environment, model, sea and options.
+    suite : str
+        Shipped suite, or the path of one of the user's own.
+    options : mapping
+        Further keywords of the environment.
+    settings_file : Path
+        TOML.
+    settings : mapping
+        Settings by name; they go before the file.
     seed : int
         0 to 799, of networks, exploration and the ships' episodes.
     randomise : bool
         True for ships that differ (`training_options`).
     threads : int
         Of torch and of the loops over ships.
+    allow_code : sequence of str
+        Code that the suite may name.
     """
 
     algorithm: str
-    task: BenchmarkTask
-    settings: LearningSettings
+    environment: str | None = None
+    model: str | None = None
+    sea: str | None = None
+    task: str | None = None
+    suite: str = DEFAULT_SUITE
+    options: Mapping[str, Any] = field(default_factory=dict)
+    settings_file: Path | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
     seed: int = 0
     randomise: bool = False
     threads: int = 1
+    allow_code: Sequence[str] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `from_dict` reads, ready for JSON."""
+        return {name: as_json(getattr(self, name)) for name in KEPT}
+
+    @classmethod
+    def from_dict(cls, content: Any, where: str) -> Self:
+        """Read what `to_dict` returned; InputError names what is wrong.
+
+        No name in it imports anything: the environment is a shipped one or a file.
+        """
+        table = dict(check_table(content, where, KEPT, KEPT))
+        for name in ("environment", "model", "task"):
+            if table[name] is not None:
+                check_text(table[name], f"{where}.{name}")
+        environment = table["environment"]
+        if environment is not None and not environment.endswith(".py"):
+            check_choice(environment, SHORT_NAMES, f"{where}.environment")
+        check_text(table["suite"], f"{where}.suite")
+        check_table(table["settings"], f"{where}.settings")
+        options = check_table(table["options"], f"{where}.options")
+        table["options"] = {name: _option(one, name) for name, one in options.items()}
+        return cls(**table)
+
+
+#: Fields of a request that its file keeps: no code that a suite may name.
+KEPT = (
+    "algorithm",
+    "environment",
+    "model",
+    "task",
+    "suite",
+    "options",
+    "settings",
+    "seed",
+    "randomise",
+    "threads",
+)
+
+
+def _option(value: Any, name: str) -> Any:
+    """Read an option of an environment from JSON."""
+    if isinstance(value, Mapping):
+        return Weather.from_dict(value, name)
+    if isinstance(value, list):
+        return [_option(entry, name) for entry in value]
+    return value
+
+
+@dataclass(frozen=True)
+class TrainingPlan:
+    """Training with all its settings, which determine the result.
+
+    Raises InputError for settings of another algorithm, commands that are not
+    continuous, or a value out of its range.
+
+    Attributes
+    ----------
+    request : TrainingRequest
+        What it was made of.
+    task : BenchmarkTask
+        Environment, model and options; evaluation is on it as it is.
+    settings : LearningSettings
+        Of the algorithm.
+    """
+
+    request: TrainingRequest
+    task: BenchmarkTask
+    settings: LearningSettings
 
     def __post_init__(self) -> None:
-        kind = settings_of(self.algorithm)
-        if type(self.settings) is not kind:
-            raise InputError(
-                f"settings: expected {kind.__name__} for {self.algorithm}, got"
-                f" {type(self.settings).__name__}"
-            )
-        check_whole(self.seed, "seed", at_least=0, at_most=799)
-        check_whole(self.threads, "threads", at_least=1, at_most=1024)
+        check_whole(self.request.seed, "seed", at_least=0, at_most=799)
+        check_whole(self.request.threads, "threads", at_least=1, at_most=1024)
         check_whole(
             self.settings.action_repeat,
             "action_repeat",
@@ -75,29 +164,35 @@ class TrainingPlan:
             hint="no longer than an episode",
         )
         self.task.task.check_fits(self.task.ship)
-        self._check_action()
-
-    def _check_action(self) -> None:
-        action = self.task.task.action
-        base = self.settings.base
-        check_choice(action, OUTPUTS, "action")
+        action = check_choice(self.task.task.action, OUTPUTS, "action")
         if action == "rudder-discrete" and self.algorithm != "ppo":
             raise InputError(
                 f"action: expected one that {self.algorithm} learns, got '{action}';"
                 " take ppo"
             )
+        base = self.settings.base
         if action != "rudder" and base != "none":
             raise InputError(
                 f"base: expected 'none' with action '{action}', got '{base}'"
             )
 
     @property
+    def algorithm(self) -> str:
+        """Name of the algorithm."""
+        return self.request.algorithm
+
+    @property
+    def threads(self) -> int:
+        """Threads of torch and of the loops over ships."""
+        return self.request.threads
+
+    @property
     def training_seed(self) -> int:
         """Seed of the first ship; the others follow."""
-        return SEEDS_EACH * self.seed
+        return SEEDS_EACH * self.request.seed
 
     def configuration(self) -> dict[str, Any]:
-        """Return all but the threads, ready for JSON."""
+        """Return all that decides the result, ready for JSON."""
         return {
             "algorithm": self.algorithm,
             "task": self.task.name,
@@ -106,49 +201,77 @@ class TrainingPlan:
             "model": self.task.model,
             "model_sha256": model_hash(self.task.ship),
             "options": as_json(self.task.options),
-            "randomise": self.randomise,
-            "seed": self.seed,
+            "randomise": self.request.randomise,
+            "seed": self.request.seed,
             "settings": self.settings.to_dict(),
         }
 
-    @classmethod
-    def from_configuration(cls, content: Mapping[str, Any], threads: int) -> Self:
-        """Make the plan that `configuration` describes."""
-        options = {}
-        for name, value in content["options"].items():
-            options[name] = _read_option(value, name)
-        task = BenchmarkTask(
-            name=content["task"],
-            environment=content["environment"],
-            model=content["model"],
-            options=options,
-            suite=content["suite"],
+
+def make_plan(request: TrainingRequest) -> TrainingPlan:
+    """Make the plan that a user asks for.
+
+    Raises InputError for an unknown algorithm, environment, task, model, option or
+    setting, with the nearest known one, or a value out of its range.
+    """
+    settings_of(request.algorithm)  # its error goes before those of the task
+    task = _task(request)
+    given: dict[str, Any] = {}
+    if request.settings_file:
+        given = read_settings_file(Path(request.settings_file), request.algorithm)
+    given |= request.settings
+    settings = load_settings(
+        request.algorithm,
+        environment=task.environment,
+        task=task.name,
+        given=given,
+        action=task.task.action,
+        suite=task.suite,
+    )
+    whole = replace(request, settings=given, settings_file=None)
+    if request.task is None:
+        whole = replace(
+            whole,
+            environment=task.environment,
+            model=task.model,
+            sea=None,
+            options=task.options,
         )
-        algorithm = content["algorithm"]
-        return cls(
-            algorithm=algorithm,
-            task=task,
-            settings=make_settings(algorithm, content["settings"]),
-            seed=content["seed"],
-            randomise=content["randomise"],
-            threads=threads,
-        )
+    return TrainingPlan(whole, task, settings)
 
 
-def _read_option(value: Any, name: str) -> Any:
-    """Read an option of an environment from JSON."""
-    if isinstance(value, Mapping):
-        return Weather.from_dict(value, name)
-    if isinstance(value, list):
-        return [_read_option(entry, name) for entry in value]
-    return value
+def _task(request: TrainingRequest) -> BenchmarkTask:
+    """Return environment, model and options."""
+    given = {
+        "--env": request.environment,
+        "--model": request.model,
+        "--sea": request.sea,
+        "--option": request.options or None,
+    }
+    options = [name for name, value in given.items() if value is not None]
+    if request.task is not None:
+        if options:
+            raise InputError(
+                f"--task: expected alone, got {options[0]} too, which the task sets;"
+                " leave one of them out"
+            )
+        return find_task(request.task, request.suite, request.allow_code)
+    if request.suite != DEFAULT_SUITE:
+        raise InputError(
+            f"--suite: expected together with --task, got {request.suite!r} alone; name"
+            " one of its tasks"
+        )
+    environment = read_environment(request.environment or "course-keeping")
+    keywords = {**environment.options, **request.options}
+    if request.sea is not None:
+        keywords = {**environment.options, "sea": request.sea, **request.options}
+    model = keywords.pop("model", "mariner")
+    return BenchmarkTask("", environment.name, request.model or model, options=keywords)
 
 
 def training_options(plan: TrainingPlan) -> dict[str, Any]:
     """Keywords of the environment that the ships learn in.
 
-    They earn what the setting `reward` says, where the algorithm has it, unless the
-    task's options do.
+    They earn what the setting `reward` says, unless the task's options do.
     With `randomise`, or the setting `model_uncertainty`, each episode has a ship drawn
     from the model's covariance, where it has one; with `randomise` also an approach
     speed of 0.8 to 1.1 times the service speed, and any of the sea states that the
@@ -156,13 +279,12 @@ def training_options(plan: TrainingPlan) -> dict[str, Any]:
     """
     task = plan.task
     options = task.arguments
-    if isinstance(plan.settings, GradientSettings):
-        options.setdefault("bounded", plan.settings.reward == "bounded")
+    options.setdefault("bounded", plan.settings.reward == "bounded")
     uncertain = plan.settings.model_uncertainty == "covariance"
     has_covariance = task.ship.covariance is not None
-    if has_covariance and (plan.randomise or uncertain):
+    if has_covariance and (plan.request.randomise or uncertain):
         options.setdefault("model_uncertainty", "covariance")
-    if plan.randomise:
+    if plan.request.randomise:
         options.setdefault("speed_range", (0.8, 1.1))
         options["sea"] = _seas(task.task, task.ship)
     return options

@@ -1,7 +1,6 @@
 """Ships as a policy that learns sees and steers them, the same as later alone."""
 
 import copy
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -126,29 +125,6 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         self._base_state = before
         for row in ended:
             infos[row]["terminal_observation"] = last[row]
-
-    def memory(self) -> dict[str, Any]:
-        """Return what further steps depend on here, for `remember`.
-
-        These are past observations, the base's state and its proposals, and with a
-        limit of the rate what is in force.
-        """
-        memory = {
-            "past": self._past,
-            "state": self._base_state,
-            "proposed": self._proposed,
-        }
-        if self.rate_limit != NO_LIMIT:
-            memory["in_force"] = self._in_force
-        return copy.deepcopy(memory)
-
-    def remember(self, memory: Mapping[str, Any]) -> None:
-        """Go on from what `memory` returned, in place of a `reset`."""
-        self._past[:] = memory["past"]
-        self._base_state = memory["state"]
-        self._proposed = memory["proposed"]
-        if "in_force" in memory:
-            self._in_force = memory["in_force"]
 
     def _commands(self) -> Any:
         """Return what the ships do."""

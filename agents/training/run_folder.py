@@ -1,58 +1,31 @@
 """Folder of a run of training; its files are listed in docs/training.md."""
 
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from agents.output import check_writable, present
-from agents.training.plan import TrainingPlan, check_same
-from agents.training.request import TrainingRequest, code_in
-from shipgym.checks import (
-    Shape,
-    check_fields,
-    check_format,
-    check_shape,
-    check_table,
-    data_only,
-    placed,
-)
+from agents.suites.environments import read_environment
+from agents.training.plan import TrainingPlan, TrainingRequest, check_same
+from shipgym.checks import check_fields, check_format, check_table, data_only
 from shipgym.errors import InputError
 from shipgym.files import make_folder, read_json, write_json
 
-FORMAT = 1
+FORMAT = 2
 RUN = "run.json"
-CHECKPOINT = "checkpoint.safetensors"
+CHECKPOINT = "checkpoint.pt"
 PROGRESS = "progress.json"
 AGENT = "agent.json"  # the best policy
 LAST = "last.json"
 TENSORBOARD = "tensorboard"
-#: Packages that decide what is learned.
-PACKAGES = (
-    "shipgym",
-    "numpy",
-    "numba",
-    "gymnasium",
-    "torch",
-    "stable-baselines3",
-    "sb3-contrib",
-)
-CONFIGURATION: Shape = {
-    "algorithm": (str,),
-    "task": (str,),
-    "suite": (str,),
-    "environment": (str,),
-    "model": (str,),
-    "options": {},
-    "settings": {},
-    "seed": (int,),
-    "randomise": (bool,),
-}
 
 
-def versions(packages: Iterable[str] = PACKAGES) -> dict[str, str]:
-    """Return the installed versions of Python and of packages."""
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that decide what is learned."""
+    packages = ("shipgym", "numpy", "numba", "gymnasium", "torch", "stable-baselines3")
     found = {"python": platform.python_version()}
     for name in packages:
         try:
@@ -80,8 +53,8 @@ def begin_folder(folder: Path, plan: TrainingPlan, command: str) -> None:
     """Make the folder of a new run; raises InputError if it cannot be written."""
     content = {
         "format": FORMAT,
+        "request": plan.request.to_dict(),
         "configuration": plan.configuration(),
-        "threads": plan.threads,
         "command": command,
         "versions": versions(),
     }
@@ -89,42 +62,35 @@ def begin_folder(folder: Path, plan: TrainingPlan, command: str) -> None:
     write_json(content, folder / RUN)
 
 
-def read_plan(folder: Path, request: TrainingRequest | None = None) -> TrainingPlan:
-    """Read the plan of the run in a folder.
+def resumed(folder: Path, given: Mapping[str, Any]) -> TrainingRequest:
+    """Return the request of the run in a folder, with what is given again in its place.
 
-    Raises InputError if there is none, its file is broken or names code that the user
-    has not asked for, or its model has changed since.
+    `given`: fields of a `TrainingRequest`; of options and settings, those that are
+    given. Raises InputError if there is no run, its file is broken or of another
+    algorithm, or it names code that is not given again.
     """
-    content = _content(folder)
-    configuration = content["configuration"]
-    where = str(folder / RUN)
+    where = f"{folder / RUN}: request"
+    stored = TrainingRequest.from_dict(_content(folder)["request"], where)
+    if given.get("algorithm", stored.algorithm) != stored.algorithm:
+        check_same({"algorithm": given["algorithm"]}, vars(stored), str(folder))
+    own = dict(given)
+    options = dict(own.pop("options", {}))
+    if "sea" in own:
+        options = {"sea": own.pop("sea"), **options}
+    if "environment" in own:
+        own["environment"], more = read_environment(own["environment"])
+        options = {**more, **options}
 
-    may_be_code = ("environment", "model", "options")
-    code = {name: configuration.get(name) for name in may_be_code}
-    own_code = None if request is None else code_in(request)
-    data_only(code, f"{where}: configuration", own_code)
-
-    with placed(where):
-        check_shape(configuration, CONFIGURATION, "configuration")
-        plan = TrainingPlan.from_configuration(configuration, content["threads"])
-    check_same(plan.configuration(), configuration, str(folder))
-    return plan
+    names = ("environment", "model", "options")
+    code = {name: getattr(stored, name) for name in names}
+    data_only(code, where, {**own, "options": options})
+    own["settings"] = {**stored.settings, **own.get("settings", {})}
+    return replace(stored, **own, options={**stored.options, **options})
 
 
 def check_resumable(folder: Path, plan: TrainingPlan) -> None:
     """Raise InputError unless the run in a folder is of this plan."""
     check_same(plan.configuration(), _content(folder)["configuration"], str(folder))
-
-
-def other_versions(folder: Path) -> list[str]:
-    """Return a line for each package whose version differs from that of the run."""
-    content = _content(folder)
-    before = check_table(content["versions"], f"{folder / RUN}: versions")
-    others = []
-    for name, now in versions().items():
-        if name in before and before[name] != now:
-            others.append(f"{name} {now} in place of {before[name]}")
-    return others
 
 
 def _content(folder: Path) -> Mapping[str, Any]:
@@ -133,12 +99,11 @@ def _content(folder: Path) -> Mapping[str, Any]:
         raise InputError(
             f"{folder}: no run of training is there; leave --resume out to begin one"
         )
-
     where = str(path)
     remedy = "start a new run in another folder"
     content = read_json(path, "run file", remedy)
-    fields = ("format", "configuration", "threads", "command", "versions")
-    check_fields(content, fields, where, remedy)
+    fields = ("format", "request", "configuration", "command", "versions")
     check_format(content, FORMAT, where)
+    check_fields(content, fields, where, remedy)
     check_table(content["configuration"], f"{path}: configuration")
     return content

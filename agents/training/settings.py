@@ -6,24 +6,19 @@ with a base in an environment (`residual`), on every task of a suite (`suites`),
 of them (`tasks`).
 """
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import Field, dataclass, field, fields, replace
+from abc import abstractmethod
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, fields
+from math import gcd
 from pathlib import Path
 from typing import Any
 
 from agents.controllers.registry import controller_kinds
-from agents.policies.weights_file import as_json
+from agents.settings import Settings, setting
 from agents.suites.environments import SHORT_NAMES
-from shipgym.checks import (
-    check_choice,
-    check_keys,
-    check_number,
-    check_table,
-    check_text,
-    check_whole,
-)
+from shipgym.checks import check_choice, check_keys, check_table, check_text
 from shipgym.errors import InputError
+from shipgym.extras import library
 from shipgym.files import read_toml, shipped_toml
 from shipgym.tasks.task import ACTIONS
 
@@ -31,26 +26,9 @@ from shipgym.tasks.task import ACTIONS
 SEEDS_EACH = 1000
 
 
-def setting(
-    meaning: str,
-    *,
-    options: Sequence[str] = (),
-    word: str = "",
-    **bounds: float,
-) -> Any:
-    """Field of a setting: what it means, and which values it may have.
-
-    A number has bounds, keywords of `check_number` or `check_whole`; a `word` may stand
-    for it, and one that ends in an underscore may have a positive number after it. A
-    word is one of the `options`, where there are any.
-    """
-    about = {"meaning": meaning, "options": options, "word": word, "bounds": bounds}
-    return field(metadata=about)
-
-
 @dataclass(frozen=True)
-class LearningSettings(ABC):
-    """Settings of all algorithms.
+class LearningSettings(Settings):
+    """Settings of all algorithms; `search` has the values that tuning tries.
 
     A decision lasts `action_repeat` control intervals.
     """
@@ -60,9 +38,13 @@ class LearningSettings(ABC):
     )
     evaluate_every: int = setting("decisions between evaluations", at_least=1)
     net_arch: tuple[int, ...] = setting(
-        "widths of the hidden layers of the policy, and of PPO's value", at_least=1
+        "widths of the hidden layers of the policy, and of PPO's value",
+        at_least=1,
+        search=[(32, 32), (64, 64), (128, 128)],
     )
-    activation: str = setting("function between the layers", options=("relu", "tanh"))
+    activation: str = setting(
+        "function between the layers", options=("relu", "tanh"), search=["relu", "tanh"]
+    )
     frame_stack: int = setting(
         "observations that the policy sees, the newest last", at_least=1
     )
@@ -70,6 +52,7 @@ class LearningSettings(ABC):
         "control intervals of a decision; a base goes on with its feedback in each of"
         " them",
         at_least=1,
+        search=[1, 4, 16],
     )
     base: str = setting(
         "classical controller that the policy adds to: a kind, a controller's file that"
@@ -96,11 +79,40 @@ class LearningSettings(ABC):
         options=("none", "covariance"),
     )
 
-    def __post_init__(self) -> None:
-        for one in fields(self):
-            value = getattr(self, one.name)
-            object.__setattr__(self, one.name, _checked(value, one))
+    ships: int = setting("ships that sail at once", at_least=1, at_most=SEEDS_EACH)
+    batch_size: int = setting(
+        "samples of one gradient step", at_least=1, search=[128, 256, 512, 1024, 2048]
+    )
+    learning_rate: float = setting(
+        "learning rate of Adam at the beginning",
+        above=0.0,
+        at_most=1.0,
+        search=(1e-4, 3e-3, "log"),
+    )
+    schedule: str = setting(
+        "course of the learning rate; linear falls to 0 at the end of the training",
+        options=("constant", "linear"),
+    )
+    gamma: float = setting(
+        "discount of a decision",
+        at_least=0.0,
+        at_most=1.0,
+        search=[0.9, 0.95, 0.98, 0.99, 0.995, 0.999],
+    )
+    reward: str = setting(
+        "what ships earn: minus the steering cost, which reward_scale suits, or the"
+        " bounded reward that environments give by default",
+        options=("cost", "bounded"),
+    )
+    reward_scale: float | str = setting(
+        "divisor of rewards before they are limited to [-10, 10]; running is the"
+        " standard deviation of their discounted sum so far",
+        above=0.0,
+        word="running",
+    )
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
         base = check_text(self.base, "base")
         if not base.endswith(".json"):
             check_choice(base, ("none", "tuned", *controller_kinds()), "base")
@@ -114,37 +126,6 @@ class LearningSettings(ABC):
     def _check_together(self) -> None:
         """Refuse settings that do not fit each other."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the settings by name, ready for JSON."""
-        return dict(as_json(self))
-
-
-@dataclass(frozen=True)
-class GradientSettings(LearningSettings):
-    """Settings of the algorithms that learn by gradients."""
-
-    ships: int = setting("ships that sail at once", at_least=1, at_most=SEEDS_EACH)
-    batch_size: int = setting("samples of one gradient step", at_least=1)
-    learning_rate: float = setting(
-        "learning rate of Adam at the beginning", above=0.0, at_most=1.0
-    )
-    schedule: str = setting(
-        "course of the learning rate; linear falls to 0 at the end of the training",
-        options=("constant", "linear"),
-    )
-    gamma: float = setting("discount of a decision", at_least=0.0, at_most=1.0)
-    reward: str = setting(
-        "what ships earn: minus the steering cost, which reward_scale suits, or the"
-        " bounded reward that environments give by default",
-        options=("cost", "bounded"),
-    )
-    reward_scale: float | str = setting(
-        "divisor of rewards before they are limited to [-10, 10]; running is the"
-        " standard deviation of their discounted sum so far",
-        above=0.0,
-        word="running",
-    )
-
     @property
     @abstractmethod
     def rollout(self) -> int:
@@ -152,24 +133,34 @@ class GradientSettings(LearningSettings):
 
 
 @dataclass(frozen=True)
-class PPOSettings(GradientSettings):
+class PPOSettings(LearningSettings):
     """Proximal policy optimisation (Schulman et al. 2017, arXiv:1707.06347)."""
 
-    n_steps: int = setting("decisions of each ship in a rollout", at_least=1)
-    n_epochs: int = setting("uses of each sample of a rollout", at_least=1)
+    n_steps: int = setting(
+        "decisions of each ship in a rollout", at_least=1, search=[16, 32, 64, 128, 256]
+    )
+    n_epochs: int = setting(
+        "uses of each sample of a rollout", at_least=1, search=(2, 12)
+    )
     gae_lambda: float = setting(
-        "decay of the generalised advantage estimate", at_least=0.0, at_most=1.0
+        "decay of the generalised advantage estimate",
+        at_least=0.0,
+        at_most=1.0,
+        search=(0.85, 1.0),
     )
     clip_range: float = setting(
-        "largest change of the ratio of probabilities", above=0.0
+        "largest change of the ratio of probabilities", above=0.0, search=(0.1, 0.4)
     )
-    ent_coef: float = setting("weight of the entropy", at_least=0.0)
+    ent_coef: float = setting(
+        "weight of the entropy", at_least=0.0, search=(1e-6, 1e-2, "log")
+    )
     vf_coef: float = setting("weight of the value's error", above=0.0)
     max_grad_norm: float = setting("longest gradient", above=0.0)
     log_std_init: float = setting(
         "logarithm of the action's standard deviation at the beginning",
         at_least=-10.0,
         at_most=3.0,
+        search=(-3.0, 0.5),
     )
     log_std_end: float | str = setting(
         "value to which the logarithm of the standard deviation falls evenly over the"
@@ -194,7 +185,7 @@ class PPOSettings(GradientSettings):
 
 
 @dataclass(frozen=True)
-class OffPolicySettings(GradientSettings):
+class OffPolicySettings(LearningSettings):
     """Settings of the algorithms that learn from a replay buffer."""
 
     buffer_size: int = setting("decisions that are remembered", at_least=1)
@@ -202,14 +193,19 @@ class OffPolicySettings(GradientSettings):
         "decisions of all ships under random actions before learning begins", at_least=0
     )
     train_freq: int = setting("decisions of each ship between updates", at_least=1)
-    gradient_steps: int = setting("gradient steps of an update", at_least=1)
+    gradient_steps: int = setting(
+        "gradient steps of an update", at_least=1, search=[2, 4, 8, 16]
+    )
     tau: float = setting(
         "share by which the target network approaches the critic in an update",
         above=0.0,
         at_most=1.0,
+        search=(1e-3, 5e-2, "log"),
     )
     critic_arch: tuple[int, ...] = setting(
-        "widths of the hidden layers of the critics", at_least=1
+        "widths of the hidden layers of the critics",
+        at_least=1,
+        search=[(64, 64), (128, 128), (256, 256)],
     )
 
     @property
@@ -232,6 +228,7 @@ class SACSettings(OffPolicySettings):
     ent_coef: float | str = setting(
         "weight of the entropy; auto or auto_0.1 adapts it, from that value",
         at_least=0.0,
+        search=["auto", "auto_0.1", "auto_0.01"],
         word="auto_",
     )
     target_entropy: float | str = setting(
@@ -239,6 +236,7 @@ class SACSettings(OffPolicySettings):
         " command has the standard deviation 0.09 with -1, 0.24 with 0",
         at_most=1.0,
         word="auto",
+        search=(-3.0, 0.5),
     )
 
 
@@ -247,10 +245,12 @@ class TD3Settings(OffPolicySettings):
     """Twin delayed DDPG (Fujimoto et al. 2018, arXiv:1802.09477)."""
 
     action_noise: float = setting(
-        "standard deviation of what is added to actions to explore", above=0.0
+        "standard deviation of what is added to actions to explore",
+        above=0.0,
+        search=(0.03, 0.5, "log"),
     )
     policy_delay: int = setting(
-        "updates of the critics for one of the policy", at_least=1
+        "updates of the critics for one of the policy", at_least=1, search=(1, 8)
     )
     target_policy_noise: float = setting(
         "standard deviation of what is added to the target's actions", at_least=0.0
@@ -267,7 +267,9 @@ class TQCSettings(SACSettings):
     n_critics: int = setting("number of critics", at_least=1)
     n_quantiles: int = setting("quantiles of each critic", at_least=1)
     top_quantiles_to_drop: int = setting(
-        "quantiles of each critic that are dropped, the largest", at_least=0
+        "quantiles of each critic that are dropped, the largest",
+        at_least=0,
+        search=(0, 5),
     )
 
     def _check_together(self) -> None:
@@ -286,48 +288,6 @@ ALGORITHMS: Mapping[str, type[LearningSettings]] = {
     "td3": TD3Settings,
     "tqc": TQCSettings,
 }
-
-
-def _checked(value: Any, one: Field[Any]) -> Any:
-    """Return the value of a setting, if its type and bounds allow it."""
-    name = one.name
-    about = one.metadata
-    bounds = about["bounds"]
-    if one.type is int:
-        return check_whole(value, name, **bounds)
-    if one.type is float:
-        return check_number(value, name, **bounds)
-    if about["options"]:
-        return check_choice(value, about["options"], name)
-    if one.type is str:
-        return value
-    if about["word"]:
-        return _number_or_word(value, name, about["word"], bounds)
-
-    if isinstance(value, str) or not isinstance(value, Sequence):
-        raise InputError(
-            f"{name}: expected widths of layers, such as [64, 64], got {value!r}"
-        )
-    return tuple(check_whole(width, name, **bounds) for width in value)
-
-
-def _number_or_word(
-    value: Any, name: str, word: str, bounds: Mapping[str, float]
-) -> Any:
-    """Return a number or a word; after an underscore the word has a positive number."""
-    alone = word.rstrip("_")
-    if value == alone:
-        return value
-    if word.endswith("_") and isinstance(value, str) and value.startswith(word):
-        try:
-            check_number(float(value.removeprefix(word)), name, above=0.0)
-        except (ValueError, InputError):
-            raise InputError(
-                f"{name}: expected a number, '{alone}' or such as '{word}0.1', got"
-                f" {value!r}"
-            ) from None
-        return value
-    return check_number(value, name, **bounds, hint=f"or '{alone}'")
 
 
 def load_settings(
@@ -388,34 +348,59 @@ def make_settings(algorithm: str, values: Mapping[str, Any]) -> LearningSettings
     Raises InputError for one unknown or missing, or a value out of its range.
     """
     kind = settings_of(algorithm)
+    names = [one.name for one in fields(kind)]
     where = f"settings of {algorithm}"
-    table = _known_settings(values, kind, where)
-    needed = [one.name for one in fields(kind)]
-    check_keys(table, table, where, needed)
-    return kind(**table)
-
-
-def changed(settings: LearningSettings, given: Mapping[str, Any]) -> LearningSettings:
-    """Replace some settings; InputError for an unknown one or a value out of range."""
-    changes = _known_settings(given, type(settings), "settings")
-    return replace(settings, **changes)
+    check_keys(values, names, where, names)
+    return kind(**values)
 
 
 def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
     """Read a user's TOML file; InputError for a broken one or an unknown setting."""
-    content = read_toml(path, "settings file")
-    return _known_settings(content, settings_of(algorithm), str(path))
+    table = check_table(read_toml(path, "settings file"), str(path))
+    check_keys(table, [one.name for one in fields(settings_of(algorithm))], str(path))
+    return dict(table)
 
 
-def _known_settings(
-    value: Any, kind: type[LearningSettings], where: str
-) -> dict[str, Any]:
-    """Return a table that names settings only, with integers as decimal numbers."""
-    table = check_table(value, where)
-    types = {one.name: one.type for one in fields(kind)}
-    check_keys(table, tuple(types), where)
-    settings = dict(table)
-    for name, given in table.items():
-        if type(given) is int and types[name] in (float, float | str):
-            settings[name] = float(given)
-    return settings
+def search_space(algorithm: str, fixed: Collection[str] = ()) -> dict[str, Any]:
+    """Return Optuna's distributions by setting, without those that are fixed.
+
+    They are drawn in this order.
+    """
+    optuna = library("optuna.distributions", "tune", "tuning needs it")
+    space: dict[str, Any] = {}
+    for one in fields(settings_of(algorithm)):
+        search = one.metadata["search"]
+        if search is None or one.name in fixed:
+            continue
+        if isinstance(search, list):
+            choices = [
+                str(value) if isinstance(value, tuple) else value for value in search
+            ]
+            space[one.name] = optuna.CategoricalDistribution(choices)
+        elif one.type is int:
+            space[one.name] = optuna.IntDistribution(*search)
+        else:
+            low, high = search[:2]
+            log = len(search) > 2
+            space[one.name] = optuna.FloatDistribution(low, high, log=log)
+    return space
+
+
+def with_parameters(
+    settings: LearningSettings, parameters: Mapping[str, Any]
+) -> LearningSettings:
+    """Return the settings that Optuna's parameters stand for.
+
+    A batch that does not divide PPO's rollout is made to. Raises InputError if they
+    conflict with those that are not varied.
+    """
+    varied = dict(parameters)
+    for one in fields(settings):
+        search = one.metadata["search"]
+        if one.name in varied and isinstance(search, list):
+            values = {str(value): value for value in search}
+            varied[one.name] = values[str(varied[one.name])]
+    if isinstance(settings, PPOSettings) and "batch_size" in varied:
+        rollout = settings.ships * varied.get("n_steps", settings.n_steps)
+        varied["batch_size"] = gcd(varied["batch_size"], rollout)
+    return settings.changed(varied)

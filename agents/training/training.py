@@ -1,20 +1,55 @@
 """Training of agents on many ships at once, evaluated on episodes held out.
 
-A run can be killed at any moment. It goes on at the last boundary between a rollout and
-the next that was kept, and ends with the same policy, bit for bit, as if nothing had
-happened (same machine, same versions).
+stable-baselines3 learns. A run can be killed at any moment and goes on from the last
+save: networks, optimisers, scale of the rewards and replay buffer; its ships begin new
+episodes. What is saved is tensors and JSON, which torch reads without running code.
 """
 
-from collections.abc import Callable
-from contextlib import ExitStack
+import json
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from agents.agent_file import load_agent
+from agents.controllers.designs import design_base
 from agents.output import in_use
+from agents.policies.policy import LearnedPolicy
 from agents.training import run_folder
-from agents.training.plan import N_EVALUATIONS, TrainingPlan
-from agents.training.result import TrainingProgress, TrainingResult
-from agents.training.training_run import TrainingRun
+from agents.training.evaluation import HeldOut, TrainingProgress, TrainingResult
+from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS, TrainingPlan
 from shipgym.errors import InputError
+from shipgym.extras import library
+from shipgym.files import read_bytes, write_bytes, write_json
+
+library("stable_baselines3", "rl", "training needs it")
+
+import torch  # noqa: E402 - behind the word on what is missing
+from stable_baselines3.common.callbacks import BaseCallback  # noqa: E402
+from stable_baselines3.common.logger import (  # noqa: E402
+    Logger,
+    TensorBoardOutputFormat,
+)
+from stable_baselines3.common.save_util import recursive_getattr  # noqa: E402
+from stable_baselines3.common.utils import set_random_seed  # noqa: E402
+
+from agents.training.algorithms import make_agent, set_deviation  # noqa: E402
+
+LARGEST_CHECKPOINT = 2_000_000_000  # bytes
+#: Arrays of a replay buffer.
+REPLAY = (
+    "observations",
+    "next_observations",
+    "actions",
+    "rewards",
+    "dones",
+    "timeouts",
+)
 
 
 def train(
@@ -26,7 +61,7 @@ def train(
     on_progress: Callable[[TrainingProgress], None] | None = None,
     command: str | None = None,
     evaluation_episodes: int = N_EVALUATIONS,
-    checkpoint_seconds: float = 45.0,
+    save_seconds: float = 45.0,
 ) -> TrainingResult:
     """Train an agent.
 
@@ -44,16 +79,16 @@ def train(
         Continue the run in the folder.
     max_seconds : float, optional
         Time of learning, without that of setting up and of evaluations, after which
-        the training stops at the next boundary; it can be resumed.
+        the training stops before the next rollout; it can be resumed.
     on_progress : callable, optional
-        Called with the progress at each boundary. An exception of it ends the training.
+        Called with the progress before each rollout. An exception of it ends the
+        training.
     command : str, optional
         Command line that is written into the run's folder.
     evaluation_episodes : int
         Episodes held out, on which the policy is chosen.
-    checkpoint_seconds : float
-        Least time between checkpoints. With a rollout on top, one is at most a minute
-        old by default.
+    save_seconds : float
+        Least time between saves.
     """
     if resume and out is None:
         raise InputError("resume: expected the folder of the run, got none")
@@ -65,12 +100,275 @@ def train(
                 run_folder.check_resumable(folder, plan)
             else:
                 run_folder.check_new(folder)
+        stack.enter_context(_torch_threads(plan.threads))
+        run = _Run(plan, folder, evaluation_episodes, save_seconds)
+        run.max_seconds = max_seconds
+        run.on_progress = on_progress
+        if folder is not None and resume:
+            run.restore(folder / run_folder.CHECKPOINT)
+        elif folder is not None:
+            words = command or f"train({plan.algorithm!r})"
+            run_folder.begin_folder(folder, plan, words)
+        return run.learn()
 
-        run = TrainingRun(plan, folder, evaluation_episodes, checkpoint_seconds)
-        if folder is not None:
-            if resume:
-                run.restore(folder / run_folder.CHECKPOINT)
-            else:
-                words = command or f"train({plan.algorithm!r})"
-                run_folder.begin_folder(folder, plan, words)
-        return run.learn(max_seconds, on_progress)
+
+class _TimeIsUpError(Exception):
+    """Ends the training before a rollout."""
+
+
+class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
+    """A training under way: it evaluates and saves its agent before rollouts."""
+
+    max_seconds: float | None = None
+    on_progress: Callable[[TrainingProgress], None] | None = None
+
+    def __init__(
+        self,
+        plan: TrainingPlan,
+        folder: Path | None,
+        evaluation_episodes: int,
+        save_seconds: float,
+    ) -> None:
+        super().__init__()
+        self.started = time.monotonic()
+        self.plan = plan
+        self.folder = folder
+        self.save_seconds = save_seconds
+        self.held_out = HeldOut(
+            plan.task, EVALUATION_SEED, evaluation_episodes, plan.threads
+        )
+        self.agent = make_agent(plan, design_base(plan.settings.base, plan.task))
+        self.policy: LearnedPolicy | None = None
+        self.curve: list[dict[str, Any]] = []
+        self.evaluating = 0.0  # s, since learning began
+        self.seconds_before = 0.0
+        self.saved_at = -np.inf
+        self.resumed_from: int | None = None
+
+    @property
+    def steps(self) -> int:
+        """Decisions learned from so far."""
+        return int(self.agent.num_timesteps)
+
+    @property
+    def seconds(self) -> float:
+        """Time spent so far, also before the run was resumed."""
+        return self.seconds_before + time.monotonic() - self.started
+
+    @property
+    def best(self) -> dict[str, Any]:
+        """Evaluation of the lowest cost, the first of them."""
+        return min(self.curve, key=lambda one: float(one["cost"]))
+
+    def learn(self) -> TrainingResult:
+        """Learn to the end, or until the time is up."""
+        self.agent.set_logger(_log(self.folder))
+        self.learning_since = time.monotonic()
+        left = self.plan.settings.total_steps - self.steps
+        finished = True
+        try:
+            if left > 0:
+                self.agent.learn(left, self, reset_num_timesteps=False)
+            if not self.curve or self.curve[-1]["steps"] != self.steps:
+                self.evaluate()
+            self.save()
+        except _TimeIsUpError:
+            finished = False
+        except ValueError as error:
+            # torch refuses to draw from a distribution that is not one
+            if "invalid values" not in str(error):
+                raise
+            raise self._diverged() from error
+        finally:
+            self.agent.logger.close()
+        return self._result(finished)
+
+    def _result(self, finished: bool) -> TrainingResult:
+        policy: Any = self.policy
+        if policy is None and self.folder is not None:
+            # found before the run was resumed
+            policy = load_agent(self.folder / run_folder.AGENT)
+        return TrainingResult(
+            self.plan,
+            policy,
+            curve=tuple(self.curve),
+            best_cost=self.best["cost"],
+            best_steps=self.best["steps"],
+            steps=self.steps,
+            lq_cost=self.held_out.lq_cost,
+            seconds=self.seconds,
+            finished=finished,
+            resumed_from=self.resumed_from,
+        )
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_start(self) -> None:
+        """Evaluate and save when it is time to; stop when the time is up."""
+        every = self.plan.settings.evaluate_every
+        last = self.curve[-1]["steps"] if self.curve else None
+        is_due = last is None or self.steps // every > last // every
+        if is_due:
+            self.evaluate()
+        if self.on_progress is not None:
+            self.on_progress(self._progress(is_due))
+        learning = time.monotonic() - self.learning_since - self.evaluating
+        is_up = self.max_seconds is not None and learning >= self.max_seconds
+        if is_up or time.monotonic() - self.saved_at >= self.save_seconds:
+            self.save()
+        if is_up:
+            raise _TimeIsUpError
+        set_deviation(self.agent, self.plan.settings)
+
+    def _progress(self, evaluated: bool) -> TrainingProgress:
+        return TrainingProgress(
+            steps=self.steps,
+            total=self.plan.settings.total_steps,
+            seconds=self.seconds,
+            cost=self.curve[-1]["cost"],
+            best_cost=self.best["cost"],
+            lq_cost=self.held_out.lq_cost,
+            evaluated=evaluated,
+        )
+
+    def evaluate(self) -> None:
+        """Run the held-out episodes; keep the policy if it is the best."""
+        for weight in self.agent.policy.parameters():
+            if not bool(weight.isfinite().all()):
+                raise self._diverged()
+        policy = LearnedPolicy.from_sb3(self.agent)
+        began = time.monotonic()
+        cost = self.held_out.cost(policy)
+        self.evaluating += time.monotonic() - began
+        returns = [episode["r"] for episode in self.agent.ep_info_buffer or ()]
+        self.curve.append(
+            {
+                "steps": self.steps,
+                "seconds": round(self.seconds, 3),
+                "cost": cost,
+                "mean_return": sum(returns) / len(returns) if returns else None,
+            }
+        )
+        self.agent.logger.record("evaluation/cost", cost)
+
+        policy = replace(policy, training=self._record())
+        is_best = self.best is self.curve[-1]
+        if is_best:
+            self.policy = policy
+        if self.folder is not None:
+            policy.save(self.folder / run_folder.LAST)
+            if is_best:
+                policy.save(self.folder / run_folder.AGENT)
+            progress = {"lq_cost": self.held_out.lq_cost, "curve": self.curve}
+            write_json(progress, self.folder / run_folder.PROGRESS)
+
+    def _diverged(self) -> InputError:
+        return InputError(
+            f"training diverged after {self.steps} steps: the network's weights are not"
+            " finite; lower learning_rate, or raise reward_scale"
+        )
+
+    def _record(self) -> dict[str, Any]:
+        """Return how a policy was made, without times."""
+        first = self.plan.training_seed
+        seeds = self.held_out.seeds.tolist()
+        return {
+            **self.plan.configuration(),
+            "training_seeds": [first, first + self.plan.settings.ships - 1],
+            "evaluation_seeds": [seeds[0], seeds[-1]],
+            "steps": self.steps,
+            "cost": self.curve[-1]["cost"],
+            "lq_cost": self.held_out.lq_cost,
+            "curve": [[row["steps"], row["cost"]] for row in self.curve],
+            "versions": run_folder.versions(),
+        }
+
+    def save(self) -> None:
+        """Write the run as it is, whole or not at all."""
+        self.saved_at = time.monotonic()
+        if self.folder is None:
+            return
+        agent = self.agent
+        _, names = agent._get_torch_save_params()
+        rewards = agent.get_env().ret_rms
+        content = {
+            "run": json.dumps({"curve": self.curve, "seconds": self.seconds}),
+            "counters": [self.steps, agent._n_updates],
+            "parameters": agent.get_parameters(),
+            "variables": {name: recursive_getattr(agent, name) for name in names},
+            "rewards": [float(rewards.mean), float(rewards.var), float(rewards.count)],
+            "replay": _replay(agent),
+        }
+        file = BytesIO()
+        torch.save(content, file)
+        write_bytes(file.getvalue(), self.folder / run_folder.CHECKPOINT)
+
+    def restore(self, checkpoint: Path) -> None:
+        """Resume from the last save; a run killed before its first one starts again."""
+        self.resumed_from = 0
+        if not checkpoint.exists():
+            return
+        file = BytesIO(read_bytes(checkpoint, "checkpoint", LARGEST_CHECKPOINT))
+        try:
+            content = torch.load(file, map_location="cpu", weights_only=True)
+            run = json.loads(content["run"])
+            self.seconds_before = float(run["seconds"])
+            self.curve = [dict(one) for one in run["curve"]]
+            _restore(self.agent, content)
+        except Exception as error:  # of torch and its unpickler, of any kind
+            first_line, _, _ = str(error).partition("\n")
+            raise InputError(
+                f"{checkpoint}: cut short, or it does not fit this run"
+                f" ({first_line.rstrip(' :')}); start a new run"
+            ) from None
+        set_random_seed(self.plan.training_seed + self.steps)
+        self.resumed_from = self.steps
+
+
+def _replay(agent: Any) -> dict[str, Any] | None:
+    """What a replay buffer holds so far, as tensors."""
+    buffer = getattr(agent, "replay_buffer", None)
+    if buffer is None:
+        return None
+    filled = buffer.buffer_size if buffer.full else buffer.pos
+    arrays = {name: getattr(buffer, name)[:filled] for name in REPLAY}
+    return {name: torch.from_numpy(array) for name, array in arrays.items()}
+
+
+def _restore(agent: Any, content: dict[str, Any]) -> None:
+    """Put what was saved into an agent of the same plan."""
+    agent.set_parameters(content["parameters"], exact_match=True, device="cpu")
+    for name, value in content["variables"].items():
+        recursive_getattr(agent, name).data.copy_(value)
+    agent.num_timesteps, agent._n_updates = content["counters"]
+    rewards = agent.get_env().ret_rms
+    rewards.mean, rewards.var, rewards.count = map(np.float64, content["rewards"])
+    replay = content["replay"]
+    if replay is not None:
+        buffer = agent.replay_buffer
+        filled = len(replay["rewards"])
+        for name in REPLAY:
+            getattr(buffer, name)[:filled] = replay[name].numpy()
+        buffer.full = filled == buffer.buffer_size
+        buffer.pos = filled % buffer.buffer_size
+
+
+@contextmanager
+def _torch_threads(number: int) -> Iterator[None]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(number)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+def _log(folder: Path | None) -> Logger:
+    """Log for TensorBoard, where there is a folder and TensorBoard is installed."""
+    formats: list[Any] = []
+    if folder is not None:
+        with suppress(ImportError, AssertionError):
+            log = TensorBoardOutputFormat(str(folder / run_folder.TENSORBOARD))
+            formats.append(log)
+    return Logger(None, formats)

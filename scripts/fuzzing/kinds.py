@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 import json
-import warnings
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -31,10 +30,10 @@ from agents.job_results import (
 from agents.jobs import JobEngine, run_jobs
 from agents.policies.sb3_zip import read_sb3
 from agents.suites.suite import load_suite, parse_suite
-from agents.training.plan import TrainingPlan, training_options
-from agents.training.run_folder import other_versions, read_plan
+from agents.training.plan import TrainingPlan, make_plan, training_options
+from agents.training.run_folder import resumed
 from agents.training.settings import load_settings, read_settings_file
-from fuzzing.reading import CORPUS, Kind
+from fuzzing.reading import Kind
 from shipgym import Episode, ShipFile, ShipModel, Trial, load_model
 from shipgym.envs.episode_file import to_file
 from shipgym.files import LARGEST_TOML, read_bytes
@@ -114,8 +113,7 @@ def use_ship(trials: list[Trial]) -> None:
 
 def read_run(path: Path) -> TrainingPlan:
     """The folder of a training."""
-    other_versions(path.parent)
-    return read_plan(path.parent)
+    return make_plan(resumed(path.parent, {}))
 
 
 def read_suite(path: Path) -> Any:
@@ -145,49 +143,6 @@ def read_kept(path: Path) -> Any:
     folder, text = path.parent, job_to_json(JOBS[0], "job")
     kept = KeptResults(folder, squared).load(text)
     return None if kept is None else run_jobs(squared, JOBS[:1], JobEngine(keep=folder))
-
-
-@cache
-def training() -> Any:
-    """A run into which checkpoints are put back, the one that the corpus's is of."""
-    import torch
-
-    from agents.training.training_run import TrainingRun
-
-    torch.set_num_threads(1)
-    with warnings.catch_warnings(
-        action="ignore"
-    ):  # random numbers in plain Python overflow, as they should
-        return TrainingRun(read_plan(CORPUS / "run" / "ppo"), None, 1, 0.0)
-
-
-def restored(path: Path) -> Any:
-    """A run that goes on from a checkpoint."""
-    with np.errstate(over="ignore"):  # as above
-        training().restore(path)
-    return training()
-
-
-def use_training(run: Any) -> None:
-    """What it does next, and its checkpoint."""
-    agent = run.learner.agent
-    agent.predict(agent._last_obs)
-    run.learner.state()
-    written(run.evaluations.to_dict())
-
-
-def keep_study(folder: Path) -> None:
-    """A study before its first trial."""
-    from agents.training.tuning import open_study
-
-    open_study(folder / "ppo", read_plan(CORPUS / "run" / "ppo"), ())
-
-
-def read_study(path: Path) -> Any:
-    """The trials that a study has on record."""
-    from agents.training.tuning import open_study
-
-    return open_study(path.parent, read_plan(CORPUS / "run" / "ppo"), ()).trials
 
 
 SUITE = load_suite()
@@ -250,8 +205,6 @@ KINDS = (
     Kind("episode", Episode.load, use_episode),
     Kind("results", load_results, use_results, main="results.json", slow=8),
     Kind("run", read_run, use_plan, main="run.json", slow=8),
-    Kind("checkpoint", restored, use_training, slow=4),
-    Kind("study", read_study, len, main="study.json", prepare=keep_study, slow=200),
     Kind("suite", read_suite, slow=2),
     Kind("settings", read_settings, slow=8),
     Kind("cell", read_cell, use_results, prepare=keep_cell, slow=10),

@@ -23,8 +23,8 @@ from agents.controllers.registry import BUILT_IN, controller_class
 from agents.policies.network import Layer, Network
 from agents.policies.policy import LearnedPolicy
 from agents.suites.suite import FOLDER
-from agents.training.request import TrainingRequest, make_plan
-from agents.training.training import train
+from agents.training.plan import TrainingRequest, make_plan
+from agents.training.run_folder import begin_folder
 from shipgym import Episode, Particulars, ShipFile, ShipModel
 from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
 from shipgym.trials.nmea import checksum
@@ -233,7 +233,7 @@ def results(folder: Path) -> None:
 
 
 def run(folder: Path) -> None:
-    """The file of a training and its checkpoint."""
+    """The file of a training."""
     settings = {
         "base": "none",
         "ships": 2,
@@ -245,18 +245,8 @@ def run(folder: Path) -> None:
         "evaluate_every": 16,
     }
     options = {"episode_steps": 20, "change_interval_steps": 10, "sea": "slight"}
-    target = folder / "run" / "ppo"
-    target.parent.mkdir()
     request = TrainingRequest("ppo", options=options, settings=settings)
-    train(make_plan(request), target, evaluation_episodes=2)
-    folder.joinpath("checkpoint").mkdir()
-    checkpoint = target / "checkpoint.safetensors"
-    checkpoint.rename(folder / "checkpoint" / "ppo.safetensors")
-    for entry in target.iterdir():
-        if entry.is_dir():
-            shutil.rmtree(entry)
-        elif entry.name != "run.json":
-            entry.unlink()
+    begin_folder(folder / "run" / "ppo", make_plan(request), "train('ppo')")
 
 
 def texts(folder: Path) -> None:

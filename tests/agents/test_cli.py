@@ -330,7 +330,12 @@ def test_options_of_a_training_reach_its_plan(tmp_path, monkeypatch):
     answer = shipgym("train", "sac", "--out", tmp_path / "run", *options.split())
     assert answer.stderr.splitlines()[-1] == "error: stopped"
     ((plan, seconds),) = plans
-    assert (plan.algorithm, plan.seed, plan.threads, seconds) == ("sac", 7, 2, 9.0)
+    assert (plan.algorithm, plan.training_seed, plan.threads, seconds) == (
+        "sac",
+        7000,
+        2,
+        9.0,
+    )
     assert plan.task.model == "tanker"
     settings = plan.settings.to_dict()
     assert (settings["gamma"], settings["base"]) == (0.9, "none")

@@ -15,8 +15,8 @@ from agents.cli import app
 from agents.cli.terminal import PlainConsole
 from agents.identifying import identification_settings
 from agents.suites.suite import parse_suite
-from agents.training.request import TrainingRequest, make_plan
-from agents.training.run_folder import RUN, begin_folder, read_plan
+from agents.training.plan import TrainingRequest, make_plan
+from agents.training.run_folder import RUN, begin_folder, check_resumable, resumed
 from identification.models.grey_box import chosen_box
 from shipgym import InputError, ShipFile, ShipModel, load_model
 from shipgym.envs.registration import check_named
@@ -391,6 +391,7 @@ def test_a_ship_file_names_models_and_no_code(evil, option, full_name):
         (("environment",), "evil:CourseKeeping-v0"),
         (("algorithm",), "evil.py"),
         (("settings", "base"), "evil:factory"),
+        (("allow_code",), ["evil"]),
     ],
 )
 def test_a_run_is_not_resumed_with_code_that_its_file_names(evil, place, value):
@@ -398,18 +399,13 @@ def test_a_run_is_not_resumed_with_code_that_its_file_names(evil, place, value):
     folder = evil.with_name("run")
     begin_folder(folder, plan, "shipgym train")
     content = json.loads((folder / RUN).read_text())
-    (folder / RUN).write_text(
-        json.dumps(added(content, ("configuration", *place), value))
-    )
-    with pytest.raises(InputError, match=f"{RUN}: "):
-        read_plan(folder)
-    (folder / RUN).write_text(
-        json.dumps(added(content, ("configuration", "model"), str(evil)))
-    )
-    with pytest.raises(
-        InputError, match="a run of another configuration: model_sha256"
-    ):
-        read_plan(folder)
+    (folder / RUN).write_text(json.dumps(added(content, ("request", *place), value)))
+    with pytest.raises(InputError):
+        make_plan(resumed(folder, {}))
+    changed = added(content, ("request", "model"), str(evil))
+    (folder / RUN).write_text(json.dumps(changed))
+    with pytest.raises(InputError, match="a run of another configuration: model"):
+        check_resumable(folder, make_plan(resumed(folder, {})))
 
 
 def test_a_run_goes_on_with_the_code_that_its_user_names_again(tmp_path):
@@ -419,14 +415,29 @@ def test_a_run_goes_on_with_the_code_that_its_user_names_again(tmp_path):
         " float\n\n\ndef reward(motion, state, interval, ship, settings):\n    return"
         " Reward(-state.heading_error**2)\n"
     )
-    given = TrainingRequest(
-        "ppo", options={"reward": str(reward)}, settings={"total_steps": 1}
-    )
-    plan = make_plan(given)
+    options = {"reward": str(reward)}
+    plan = make_plan(TrainingRequest("ppo", options=options))
     begin_folder(tmp_path / "run", plan, "shipgym train")
-    assert read_plan(tmp_path / "run", given).configuration() == plan.configuration()
+    again = make_plan(resumed(tmp_path / "run", {"options": options}))
+    assert again.configuration() == plan.configuration()
     with pytest.raises(InputError, match=r"options\.reward: expected data"):
-        read_plan(tmp_path / "run")
+        resumed(tmp_path / "run", {})
+
+
+@pytest.mark.parametrize("what", [open, exec])
+def test_a_checkpoint_runs_no_code(what, tmp_path):
+    class Evil:
+        def __reduce__(self):
+            return what, ("RAN", "w") if what is open else (CODE,)
+
+    torch = pytest.importorskip("torch")
+    plan = make_plan(TrainingRequest("ppo", settings={"total_steps": 1}))
+    begin_folder(tmp_path / "run", plan, "shipgym train")
+    torch.save({"run": Evil()}, tmp_path / "run" / "checkpoint.pt")
+    from agents.training.training import train
+
+    with pytest.raises(InputError, match=r"checkpoint\.pt: cut short, or it does not"):
+        train(plan, tmp_path / "run", resume=True)
 
 
 def test_an_agent_only_records_what_it_learned_with(evil):

@@ -8,7 +8,7 @@ from agents.benchmarking.sources import pretrained
 from agents.controllers.interface import check_fits, model_hash
 from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import load_suite
-from agents.training.request import TrainingRequest, make_plan
+from agents.training.plan import TrainingRequest, make_plan
 
 TASKS = [task.design_task for task in load_suite().tasks if task.on == "ship"]
 SEEDS = 5  # of training, an agent each
