@@ -1,10 +1,8 @@
-"""The order of the house: what `docs/architecture.md` says and draws is what the code
-does."""
+"""The order of the house: imports run down, and pages say what the code does."""
 
 import ast
 import re
 import tomllib
-import xml.etree.ElementTree as ElementTree
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -23,91 +21,50 @@ PAGES = [
 ]
 
 
-@pytest.fixture(scope="module")
-def imports():
-    """Pairs of modules, the first of which imports the second; lazy and TYPE_CHECKING
-    imports counted."""
-    return draw_architecture.imports()
+def test_imports_run_down_the_layers():
+    """Rooms import rooms of lower layers, and packages the packages below."""
+    left = {
+        "agents.controllers.designs -> agents.agent_file",
+        "identification.models.methods -> identification",
+        "shipgym.pages.templates -> shipgym",
+    }
+    assert set(draw_architecture.upward(draw_architecture.imports())) <= left
 
 
-def test_imports_run_from_agents_to_identification_to_shipgym(imports):
-    rank = {name: i for i, name in enumerate(PACKAGES)}
-    upward = [
-        (a, b)
-        for a, b in imports
-        if rank[a.partition(".")[0]] < rank[b.partition(".")[0]]
-    ]
-    assert not upward
+def test_every_room_has_its_layer():
+    rooms = {
+        (package, path.name)
+        for package in draw_architecture.LAYERS
+        for path in (ROOT / package).iterdir()
+        if (path / "__init__.py").is_file()
+    }
+    drawn = {
+        (package, room)
+        for package, layers in draw_architecture.LAYERS.items()
+        for layer in layers
+        for room in layer
+    }
+    assert rooms - drawn <= {("shipgym", "examples")}
+    modules = draw_architecture.modules()
+    assert all(f"{package}.{room}" in modules for package, room in drawn)
 
 
-def test_no_file_imports_itself_by_way_of_others(imports):
+def test_no_file_imports_itself_by_way_of_others():
     graph = {}
-    for a, b in imports:
-        graph.setdefault(a, set()).add(b)
+    for importer, imported in draw_architecture.imports():
+        graph.setdefault(importer, set()).add(imported)
     circle = []
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
         circle = error.args[1]
-    assert not circle
+    assert circle == []
 
 
-def test_training_and_benchmarking_do_not_know_each_other(imports):
-    rooms = draw_architecture.room_imports(imports)
-    assert ("agents.training", "agents.benchmarking") not in rooms
-    assert ("agents.benchmarking", "agents.training") not in rooms
-
-
-def test_every_room_is_drawn():
-    rooms = {
-        f"{package}.{path.name}"
-        for package in PACKAGES
-        for path in (ROOT / package).iterdir()
-        if (path / "__init__.py").is_file()
-    }
-    assert rooms - draw_architecture.ROOMS.keys() <= {"shipgym.examples"}
-    known = draw_architecture.modules()
-    drawn = draw_architecture.ROOMS.keys() - set(draw_architecture.APART.values())
-    assert drawn <= known.keys()
-    assert draw_architecture.APART.keys() <= known.keys()
-
-
-def test_what_follows_from_the_arrows_is_what_the_rooms_import(imports):
-    rooms = draw_architecture.room_imports(imports)
-    inside = {(a, b) for a, b in rooms if a.partition(".")[0] == b.partition(".")[0]}
-    down, back = draw_architecture.arrows(imports)
-    assert down | back <= inside
-    for a, b in inside - back:
-        assert b in draw_architecture.reached(down, a)
-
-
-@pytest.mark.parametrize("name", draw_architecture.PICTURES)
-def test_the_pictures_are_those_of_the_code(name):
-    drawn = draw_architecture.PICTURES[name]()
-    ElementTree.fromstring(drawn)
-    committed = (draw_architecture.IMAGES / name).read_text(encoding="utf-8")
+def test_the_picture_is_that_of_the_layers():
+    committed = draw_architecture.PICTURE.read_text(encoding="utf-8")
+    drawn = draw_architecture.picture()
     assert committed == drawn, "run python scripts/draw_architecture.py"
-
-
-def test_the_picture_of_a_step_names_functions_that_the_parts_have():
-    from shipgym.instruments import bridge, perfect
-    from shipgym.sea import open_sea
-    from shipgym.tasks import course_keeping, path_following
-
-    named = {
-        (giver, one)
-        for _, given in draw_architecture.stages().values()
-        for giver, one in given
-    }
-    for giver, one in named:
-        if giver == "the task":
-            assert hasattr(course_keeping, one), one
-            assert hasattr(path_following, one), one
-        if giver == "the sensor set":
-            assert hasattr(bridge, one), one
-            assert hasattr(perfect, one), one
-        if giver == "the sea":
-            assert hasattr(open_sea, one), one
 
 
 NAMED = re.compile(r"`((?:shipgym|identification|agents)/[\w/]+\.py)`: `(\w+)`")
