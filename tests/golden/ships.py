@@ -105,17 +105,13 @@ def random_motions(model: Any) -> tuple[Floats, Floats]:
 
 
 def record_manoeuvres(name: str) -> dict[str, Floats]:
-    """Indices of the standard manoeuvres and a reverse spiral, criteria, trials in calm
-    water and sea."""
+    """Indices of the standard manoeuvres, criteria, trials in calm water and sea."""
     model = ship_named(name)
     found: dict[str, Floats] = {}
     judged: dict[str, Callable[[], Any]] = {
         what: lambda one=one: one.evaluate(model)
         for what, one in manoeuvres.standard_manoeuvres(model).items()
     }
-    judged["reverse spiral"] = lambda: manoeuvres.spiral_indices(
-        manoeuvres.reverse_spiral(model)
-    )
     judged["zigzag 20/10 in a rough sea"] = lambda: manoeuvres.zigzag_indices(
         manoeuvres.zigzag(model, 20.0, 10.0, dt=0.5, weather="rough", seed=5)
     )
