@@ -95,7 +95,7 @@ CHANGING_SEA = shipgym.Weather(
 )
 GUSTS = shipgym.Weather(
     current=shipgym.Current(0.5),
-    wind=shipgym.Wind(14.0, spectrum="norsok", coefficients="isherwood"),
+    wind=shipgym.Wind(14.0),
 )
 CORNERS = [[0.0, 0.0], [1600.0, 0.0], [2800.0, 900.0], [4000.0, 400.0]]
 

@@ -53,10 +53,8 @@ SHIPS: Mapping[str, Any] = {"speed_range": (0.7, 1.05), "loading_range": (0.9, 1
 NOISE: Mapping[str, Any] = {"noise": 0.7, "measurement": "filtered"}
 SMOOTH = shipgym.Weather(
     current=shipgym.Current(0.7, towards_deg=30.0),
-    wind=shipgym.Wind(11.0, gust=False, coefficients="isherwood"),
-    waves=shipgym.Waves(
-        2.0, 7.0, spectrum="pierson-moskowitz", spreading="long-crested"
-    ),
+    wind=shipgym.Wind(11.0, gust=False),
+    waves=shipgym.Waves(2.0, 7.0, peak_enhancement=1.0, spreading="long-crested"),
 )
 
 
