@@ -21,12 +21,12 @@ from .models.checker import check_ship_model as check_ship_model
 from .models.linear import StraightLineStability as StraightLineStability
 from .models.linear import straight_line_stability as straight_line_stability
 from .models.scaling import scale_model as scale_model
+from .sea.conditions import Current as Current
+from .sea.conditions import Waves as Waves
 from .sea.conditions import Weather as Weather
+from .sea.conditions import Wind as Wind
+from .sea.conditions import sea_states as sea_states
 from .sea.current_field import CurrentField as CurrentField
-from .sea.current_wind_waves import Current as Current
-from .sea.current_wind_waves import Waves as Waves
-from .sea.current_wind_waves import Wind as Wind
-from .sea.sea_states import sea_states as sea_states
 from .ships import ShipEquations as ShipEquations
 from .ships import list_structures as list_structures
 from .ships import register_structure as register_structure

@@ -15,8 +15,7 @@ from agents.rollouts.rollout import Rollout, rollout
 from shipgym.arrays import Flags, Floats
 from shipgym.envs.engine import Engine
 from shipgym.models import ShipModel
-from shipgym.sea.conditions import Weather
-from shipgym.sea.current_wind_waves import Current
+from shipgym.sea.conditions import Current, Weather
 from shipgym.tasks.task import Task, course_keeping_task
 
 #: Distance from the data of a model that no ship reaches before she is lost.

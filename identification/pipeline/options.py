@@ -77,8 +77,8 @@ class Options:
         coefficients, where wind was logged; "none": not removed; "constant": a constant
         sway and yaw acceleration is fitted to each trial; or by a name of coefficients
         in `shipgym.sea`, or a table such as
-        `{ coefficients = "isherwood", relative = true }`; relative means the wind felt
-        on board, measured from the bow.
+        `{ coefficients = "blendermann-ferry", relative = true }`; relative means the
+        wind felt on board, measured from the bow.
     rudder_bias : {"auto", "none"}
         Constant moment of a rudder that is off, or of a propeller that turns one way.
         "auto": a structure without a constant is given one where the bias differs from

@@ -1,8 +1,7 @@
 """Weather: the effects of current, wind and waves on a ship.
 
-User input is in `conditions`; its effects on one ship are in `wind`,
-`gusts`, `waves`, `motions`, `drift` and `weather_column`. The public names are in
-`__init__.pyi`.
+User input is in `conditions`; its effects on one ship are in `wind`, `motions`,
+`drift` and `weather_column`. The public names are in `__init__.pyi`.
 """
 
 from lazy_loader import attach_stub

@@ -1,18 +1,234 @@
-"""Weather that a user asks for: current, wind and waves together, or a sea state."""
+"""Weather as a user describes it: current, wind and waves, or a sea state."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Literal
 
-from shipgym.checks import check_table, check_text
+from shipgym.checks import (
+    check_choice,
+    check_flag,
+    check_number,
+    check_table,
+    check_text,
+    did_you_mean,
+    quoted,
+)
+from shipgym.constants import GRAVITY
 from shipgym.errors import InputError
+from shipgym.sea.current_field import CurrentField
+from shipgym.sea.wind_coefficients import WindTable, check_coefficients
 
-if TYPE_CHECKING:
-    from shipgym.sea.current_field import CurrentField
-    from shipgym.sea.current_wind_waves import Current, Waves, Wind
+
+@dataclass(frozen=True)
+class Current:
+    """A current that is the same everywhere, steady or slowly varying.
+
+    Raises InputError for values that no current has.
+
+    Parameters
+    ----------
+    speed : float
+        Mean, m/s.
+    towards_deg : float or None
+        Direction it flows to, degrees clockwise from north; None: drawn for each
+        episode of an environment.
+    variation : float
+        Standard deviation of each of the north and east components about the mean, m/s;
+        0 is steady.
+    time_constant : float
+        Of the first-order Gauss-Markov process of the variation, s.
+    """
+
+    speed: float
+    towards_deg: float | None = None
+    variation: float = 0.0
+    time_constant: float = 600.0
+
+    def __post_init__(self) -> None:
+        _keep_number(self, "current", "speed", at_least=0.0, at_most=10.0)
+        _keep_number(self, "current", "variation", at_least=0.0, at_most=5.0)
+        _keep_number(self, "current", "time_constant", above=0.0, hint="in s")
+        _keep_direction(self, "current", "towards_deg")
+
+    @property
+    def calm(self) -> bool:
+        """True where no water flows."""
+        return self.speed == 0.0 and self.variation == 0.0
+
+
+@dataclass(frozen=True)
+class Wind:
+    """A mean wind with gusts.
+
+    Raises InputError for values that no wind has.
+
+    Parameters
+    ----------
+    speed : float
+        Mean over an hour, 10 m above the sea, m/s.
+    from_deg : float or None
+        Direction it comes from, degrees clockwise from north; None: drawn for each
+        episode of an environment.
+    gust : bool
+        True for a speed that varies about its mean.
+    coefficients : str or WindTable
+        "blendermann" (type of ship guessed from its fullness), "blendermann-" and a
+        type of `BLENDERMANN`, or a table of your own.
+    """
+
+    speed: float
+    from_deg: float | None = None
+    gust: bool = True
+    coefficients: str | WindTable = "blendermann"
+
+    def __post_init__(self) -> None:
+        _keep_number(self, "wind", "speed", at_least=0.0, at_most=75.0)
+        _keep_direction(self, "wind", "from_deg")
+        check_coefficients(self.coefficients, "wind coefficients")
+        check_flag(self.gust, "wind gust")
+
+    @property
+    def calm(self) -> bool:
+        """True where no wind blows."""
+        return self.speed == 0.0
+
+
+@dataclass(frozen=True)
+class Waves:
+    """An irregular sea.
+
+    Raises InputError for values that no sea has, such as waves steeper than they can
+    be.
+
+    Parameters
+    ----------
+    significant_height : float
+        Hs, four times the standard deviation of the elevation, m.
+    peak_period : float
+        Tp, period of the peak of the spectrum, s.
+    from_deg : float or None
+        Where they come from, degrees clockwise from north; None: drawn for each episode
+        of an environment.
+    peak_enhancement : float
+        gamma of the JONSWAP spectrum, 1 to 20; 1 is a fully developed sea (Pierson &
+        Moskowitz).
+    spreading : {"cosine-squared", "long-crested"}
+        How the energy is spread over directions about the mean: (2 / pi) cos^2 within
+        90 degrees to either side, as wind seas are (DNV-RP-C205, section 3.5.8), or not
+        at all, as in a tank or a swell.
+    """
+
+    significant_height: float
+    peak_period: float
+    from_deg: float | None = None
+    peak_enhancement: float = 3.3
+    spreading: Literal["cosine-squared", "long-crested"] = "cosine-squared"
+
+    def __post_init__(self) -> None:
+        _keep_number(self, "waves", "significant_height", at_least=0.0, at_most=20.0)
+        _keep_number(self, "waves", "peak_period", above=0.0, at_most=40.0, hint="in s")
+        _keep_number(self, "waves", "peak_enhancement", at_least=1.0, at_most=20.0)
+        _keep_direction(self, "waves", "from_deg")
+        check_choice(
+            self.spreading,
+            ("cosine-squared", "long-crested"),
+            "waves spreading",
+        )
+        wave_length = GRAVITY * self.peak_period**2 / (2.0 * math.pi)
+        highest = wave_length / 10.0
+        if self.significant_height > highest:
+            raise InputError(
+                f"waves significant_height: expected at most {highest:.3g} m with"
+                f" peak_period {self.peak_period:g}, got {self.significant_height:g};"
+                " steeper waves break: give a lower height or a longer period"
+            )
+
+    @property
+    def calm(self) -> bool:
+        """True where the sea is flat."""
+        return self.significant_height == 0.0
+
+
+def _keep_number(part: Any, where: str, name: str, **bounds: Any) -> None:
+    """Make a float of a field, which must be within bounds (`check_number`)."""
+    number = check_number(getattr(part, name), f"{where} {name}", **bounds)
+    object.__setattr__(part, name, number)
+
+
+def _keep_direction(part: Any, where: str, name: str) -> None:
+    """Make a float of a direction, unless it is to be drawn."""
+    if getattr(part, name) is not None:
+        hint = "degrees clockwise from north"
+        _keep_number(part, where, name, at_least=-360.0, at_most=360.0, hint=hint)
+
+
+PARTS: dict[str, type[Any]] = {"current": Current, "wind": Wind, "waves": Waves}
+
+
+# ---- sea states ------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class SeaState:
+    """One row of the table of sea states."""
+
+    name: str  # in the words of WMO code table 3700
+    code: int  # its number there
+    # Hs, m, and Tp, s, taken
+    significant_height: float
+    peak_period: float
+    wind_speed: float  # 10 m above the sea, m/s
+
+
+def sea_states() -> dict[str, SeaState]:
+    """Sea states by name, from calm to rough.
+
+    Heights, most probable modal periods and sustained winds: Bales 1983, Designing
+    ships to the natural environment, Naval Engineers Journal 95(2), open ocean North
+    Atlantic (also Lee & Bales, STANAG 4194).
+    """
+    return {
+        "calm": SeaState("calm", 0, 0.0, 0.0, 0.0),
+        "slight": SeaState("slight", 3, 0.88, 7.5, wind_at_10_m(13.5)),
+        "moderate": SeaState("moderate", 4, 1.88, 8.8, wind_at_10_m(19.0)),
+        "rough": SeaState("rough", 5, 3.25, 9.7, wind_at_10_m(24.5)),
+    }
+
+
+def wind_at_10_m(knots: float) -> float:
+    """Wind 10 m above the sea, m/s, by that at 19.5 m, knots.
+
+    The power law of 1/7 is that of the notes to the table.
+    """
+    metres_per_second = knots * 1852.0 / 3600.0
+    return float(metres_per_second * (10.0 / 19.5) ** (1.0 / 7.0))
+
+
+def find_sea_state(name: str | int) -> SeaState:
+    """Sea state by its name or WMO code; InputError for one that is not there."""
+    states = sea_states()
+    for state in states.values():
+        if name in (state.name, state.code) and not isinstance(name, bool):
+            return state
+
+    hint = ""
+    if isinstance(name, str):
+        hint = did_you_mean(name, states)
+    names = quoted(states)
+    codes = [str(state.code) for state in states.values()]
+    listed = ", ".join(codes)
+    raise InputError(
+        f"sea state: expected one of {names}, or their WMO codes {listed}, got"
+        f" {name!r}; for another sea give Weather(wind=Wind(...), waves=Waves(...))"
+        f".{hint}"
+    )
+
+
+# ---- weather ------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -34,8 +250,15 @@ class Weather:
         check_text(self.name, "weather name")
         for name in ("current", "wind", "waves"):
             part = getattr(self, name)
-            if part is not None:
-                _check_part(part, name)
+            kind = PARTS[name]
+            if isinstance(part, kind) or part is None:
+                continue
+            if name == "current" and isinstance(part, CurrentField):
+                continue
+            raise InputError(
+                f"weather {name}: expected shipgym.{kind.__name__}(...) or None, got"
+                f" {part!r}"
+            )
 
     @classmethod
     def from_sea_state(
@@ -56,9 +279,6 @@ class Weather:
             north-east; None: drawn for each episode of an environment.
         current : Current, optional
         """
-        from shipgym.sea.current_wind_waves import Waves, Wind
-        from shipgym.sea.sea_states import find_sea_state
-
         state = find_sea_state(name)
         if state.wind_speed == 0.0:
             return cls(current=current, name=state.name)
@@ -87,10 +307,9 @@ class Weather:
         InputError, beginning with `where`, for an unknown key, a missing value or one
         that no weather has.
         """
-        kinds = part_types()
-        table = check_table(mapping, where, ("name", *kinds))
+        table = check_table(mapping, where, ("name", *PARTS))
         parts = {}
-        for name, kind in kinds.items():
+        for name, kind in PARTS.items():
             content = table.get(name)
             if content is not None:
                 parts[name] = _read_part(kind, content, f"{where} {name}")
@@ -98,29 +317,7 @@ class Weather:
         return cls(**parts, name=name)
 
 
-def part_types() -> dict[str, type[Any]]:
-    """Types of the parts of a weather, by name."""
-    from shipgym.sea.current_wind_waves import Current, Waves, Wind
-
-    return {"current": Current, "wind": Wind, "waves": Waves}
-
-
-def _check_part(part: Any, name: str) -> None:
-    from shipgym.sea.current_field import CurrentField
-
-    kind = part_types()[name]
-    if name == "current" and isinstance(part, CurrentField):
-        return
-    if not isinstance(part, kind):
-        raise InputError(
-            f"weather {name}: expected shipgym.{kind.__name__}(...) or None, got"
-            f" {part!r}"
-        )
-
-
 def _read_part(kind: type[Any], content: Any, where: str) -> Any:
-    from shipgym.sea.wind_coefficients import WindTable
-
     known = fields(kind)
     table = check_table(
         content,
@@ -154,11 +351,7 @@ def as_weather(
             f"{where}: expected a Weather of shipgym.sea or the name of a sea state,"
             f" got {weather!r}"
         )
-    if weather == "calm":  # the default, which loads no other part of the sea
-        return Weather(name="calm")
     if weather.endswith(".py"):
-        from shipgym.sea.current_field import CurrentField
-
         return Weather(current=CurrentField(weather), name=Path(weather).stem)
     try:
         return Weather.from_sea_state(weather, from_deg)

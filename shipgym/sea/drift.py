@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from shipgym.arrays import Floats
 from shipgym.constants import GRAVITY
 from shipgym.sea.added_resistance import added_resistance
-from shipgym.sea.current_wind_waves import Waves
+from shipgym.sea.conditions import Waves
 from shipgym.sea.estimates import hull_of, weather_particulars
 from shipgym.sea.harmonics import (
     Harmonics,
@@ -49,7 +49,6 @@ class WaveDrift:
     # of the slow variation, s and without unit
     time_constant: float
     standard_deviation: float
-    estimated: tuple[str, ...] = ()  # particulars that were estimated for it
 
     def harmonics(self, n: int = 8) -> Harmonics:
         """Fourier series up to the n-th harmonic, for kernels; K, which heels, is 0."""
@@ -89,7 +88,6 @@ def wave_drift(
     yaw = by_length_squared * ship.length**2 * pressure
 
     variation = slow_drift(waves, ship)
-    used = {"block_coefficient", "water_density"}
     return WaveDrift(
         circle(),
         X=over_directions(mirrored(surge), waves),
@@ -97,7 +95,6 @@ def wave_drift(
         N=over_directions(mirrored(yaw, -1.0), waves),
         time_constant=variation.time_constant,
         standard_deviation=variation.standard_deviation,
-        estimated=tuple(sorted(ship.estimated & used)),
     )
 
 

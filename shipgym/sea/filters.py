@@ -10,6 +10,16 @@ from typing import NamedTuple
 from shipgym.engine.mathematics import sin_cos
 
 
+class GaussMarkov(NamedTuple):
+    """A first-order process of mean zero.
+
+    Its autocorrelation is standard_deviation^2 exp(-|lag| / time_constant).
+    """
+
+    time_constant: float  # s
+    standard_deviation: float  # in the units of the process
+
+
 class Filter(NamedTuple):
     """A first-order process in its discrete form."""
 

@@ -7,7 +7,7 @@ from numpy import cos, exp, pi, sin, sinc, trapezoid
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
-from shipgym.sea.current_wind_waves import Waves
+from shipgym.sea.conditions import Waves
 from shipgym.sea.estimates import Hull, hull_of, weather_particulars
 from shipgym.sea.harmonics import circle, cosine_coefficients, half_circle, mirrored
 from shipgym.sea.waves import (
@@ -86,7 +86,6 @@ class WaveMotion:
     # shape (points,); rad2
     heading_variance: Floats
     roll_variance: Floats
-    estimated: tuple[str, ...] = ()  # particulars that were estimated for it
 
     def heading_variance_harmonics(self, n: int = 8) -> Floats:
         """Cosine series of the heading's variance, mean first, shape (n + 1,).
@@ -120,10 +119,8 @@ def wave_motion(
         in_long_crests = trapezoid(response**2 * spectrum, omega, axis=-1)
         return over_directions(mirrored(in_long_crests), waves)
 
-    used = {"metacentric_height", "roll_period", "block_coefficient"}
     return WaveMotion(
         circle(),
         heading_variance=variance(heading_response(omega, chi, ship)),
         roll_variance=variance(roll_response(omega, chi, ship, U)),
-        estimated=tuple(sorted(ship.estimated & used)),
     )

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 from shipgym.constants import GRAVITY
-from shipgym.sea.current_wind_waves import Waves
+from shipgym.sea.conditions import Waves
 from shipgym.sea.estimates import weather_particulars
-from shipgym.sea.gusts import GaussMarkov
+from shipgym.sea.filters import GaussMarkov
 from shipgym.sea.harmonics import circle
 from shipgym.ships.particulars import Particulars
 
@@ -88,7 +88,9 @@ def _enhanced_variance(gamma: float) -> float:
 
 def wave_spectrum(waves: Waves, omega: ArrayLike) -> Floats:
     """Spectrum of the elevation of a sea, m2 s/rad."""
-    return jonswap(omega, waves.significant_height, waves.peak_period, waves.gamma)
+    return jonswap(
+        omega, waves.significant_height, waves.peak_period, waves.peak_enhancement
+    )
 
 
 def frequencies(waves: Waves) -> Floats:
@@ -139,7 +141,7 @@ def wave_filter(waves: Waves) -> WaveFilter:
     control, IEEE Trans. Automatic Control 28); Fossen 2011, 8.2.
     """
     peak = 2.0 * pi / waves.peak_period
-    damping = _fitted_damping(waves.gamma)
+    damping = _fitted_damping(waves.peak_enhancement)
     return WaveFilter(peak, damping, gain=float(2.0 * sqrt(damping * peak)))
 
 
@@ -195,7 +197,7 @@ def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:
     ship = weather_particulars(particulars)
     draught = ship.require("draught")
     # the height does not matter
-    shape = jonswap(omega, 1.0, waves.peak_period, waves.gamma)
+    shape = jonswap(omega, 1.0, waves.peak_period, waves.peak_enhancement)
     Sc = shape * draught_attenuation(omega, draught)
     mean = trapezoid(Sc, omega)
     squares = trapezoid(Sc**2, omega)

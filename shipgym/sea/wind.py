@@ -1,11 +1,14 @@
-"""Wind forces on a ship over the direction of the relative wind."""
+"""Wind forces on a ship over the direction of the relative wind, and gusts."""
 
 from dataclasses import dataclass
+from math import gamma, pi, sqrt
 
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.sea.estimates import house_area, house_height, weather_particulars
+from shipgym.sea.conditions import Wind
+from shipgym.sea.estimates import weather_particulars
+from shipgym.sea.filters import GaussMarkov
 from shipgym.sea.harmonics import (
     Harmonics,
     circle,
@@ -19,10 +22,15 @@ from shipgym.sea.wind_coefficients import (
     blendermann_coefficients,
     blendermann_type,
     check_coefficients,
-    isherwood_coefficients,
 )
 from shipgym.ships.particulars import Particulars
 
+#: Surface drag coefficient of Harris's spectrum for a rough sea.
+SURFACE_DRAG = 0.003
+#: 2^(2/3) B(1/2, 1/3), with Euler's beta function.
+HARRIS_VARIANCE = 2.0 ** (2.0 / 3.0) * (
+    gamma(1.0 / 2.0) * gamma(1.0 / 3.0) / gamma(5.0 / 6.0)
+)
 #: At 15 degrees Celsius and sea level, kg/m3 (ISO 2533 standard atmosphere).
 AIR_DENSITY = 1.225
 
@@ -53,8 +61,7 @@ class WindCurves:
         """Fourier series of the curves up to the n-th harmonic, for kernels.
 
         For n = 8 the largest difference from the curve is below 1.5 % of its largest
-        value for Blendermann's coefficients and below 9 % for Isherwood's, whose tables
-        have kinks (`tests/shipgym/test_wind.py`).
+        value for Blendermann's coefficients (`tests/shipgym/test_wind.py`).
         """
         return Harmonics(
             X=cosine_coefficients(self.X, n),
@@ -111,9 +118,6 @@ def _coefficients(
     height = ship.require("lateral_centroid_height")
     if isinstance(coefficients, WindTable):
         return coefficients.at(angle), lateral / length
-    if coefficients == "isherwood":
-        return _isherwood(ship, angle), height
-
     type_of_ship = blendermann_type(coefficients, ship.require("block_coefficient"))
     found = blendermann_coefficients(
         BLENDERMANN[type_of_ship],
@@ -124,31 +128,19 @@ def _coefficients(
     return found, height
 
 
-def _isherwood(ship: Particulars, angle: Floats) -> WindCoefficients:
-    """Isherwood's coefficients, with an outline estimated from the lateral area.
+def gust_filter(wind: Wind) -> GaussMarkov:
+    """First-order process with the variance and most energetic frequency of gusts.
 
-    The sway force is taken to act at the centroid of the lateral area.
+    Harris 1971: f S / (k V^2) = 4 x / (2 + x^2)^(5/6) with x = f 1800 m / V and the
+    surface drag coefficient k. Its integral is 6.677 k V^2, and it is largest at x =
+    sqrt(3); f S(f) of a Gauss-Markov process at f = 1 / (2 pi T), so T = 165.4 m / V.
+    Without gusts the deviation, m/s, is 0.
     """
-    length = ship.require("length_overall")
-    lateral = ship.require("lateral_area")
-    # along the deck, up and down the sides of a rectangle of the same area, and of the
-    # house
-    perimeter = length + 2.0 * lateral / length + 2.0 * house_height(ship)
-    rows = isherwood_coefficients(
-        length,
-        ship.require("beam"),
-        lateral,
-        ship.require("frontal_area"),
-        perimeter=perimeter,
-        bow_to_centroid=0.5 * length - ship.require("lateral_centroid"),
-        masts=2.0,
-        superstructure_area=min(house_area(ship), 0.9 * lateral),
-    )
-    given_at = np.radians(np.arange(0, 181, 10))
-    CX, CY, CN = (np.interp(angle, given_at, row) for row in rows)
-    return WindCoefficients(
-        CX=CX,
-        CY=CY,
-        CN=CN,
-        CK=CY,
+    if not wind.gust or wind.calm:
+        return GaussMarkov(1.0, 0.0)
+    V = wind.speed
+    peak = sqrt(3.0) * V / 1800.0
+    return GaussMarkov(
+        time_constant=1.0 / (2.0 * pi * peak),
+        standard_deviation=sqrt(HARRIS_VARIANCE * SURFACE_DRAG * V**2),
     )

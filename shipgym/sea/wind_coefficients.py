@@ -1,7 +1,6 @@
 """Wind coefficients: published ones, and tables of a user's own ship.
 
-The published ones are by Blendermann 1994 for types of ship and by Isherwood 1972 from
-a regression (`wind.toml`).
+The published ones are by Blendermann 1994 for types of ship (`wind.toml`).
 """
 
 from __future__ import annotations
@@ -44,8 +43,6 @@ class WindCoefficients(NamedTuple):
 _TABLES = shipped_toml("shipgym.sea", "wind.toml")
 #: By type of ship.
 BLENDERMANN = {ship: Blendermann(*row) for ship, row in _TABLES["blendermann"].items()}
-#: Rows of CX, CY and CN every 10 degrees from the bow; columns of the regression.
-ISHERWOOD = {name: np.array(rows) for name, rows in _TABLES["isherwood"].items()}
 
 
 @dataclass(frozen=True)
@@ -155,7 +152,7 @@ def _numbers(values: Any, where: str) -> tuple[float, ...]:
 def coefficient_names() -> tuple[str, ...]:
     """Words that `Wind(coefficients=...)` understands."""
     types = [f"blendermann-{ship}" for ship in BLENDERMANN]
-    return ("blendermann", "isherwood", *types)
+    return ("blendermann", *types)
 
 
 def check_coefficients(value: Any, where: str) -> None:
@@ -213,36 +210,3 @@ def blendermann_coefficients(
         CN=lever * CY,
         CK=row.kappa * CY,
     )
-
-
-def isherwood_coefficients(
-    length: float,
-    beam: float,
-    lateral_area: float,
-    frontal_area: float,
-    perimeter: float,
-    bow_to_centroid: float,
-    masts: float,
-    superstructure_area: float,
-) -> tuple[Floats, Floats, Floats]:
-    """Isherwood's coefficients every 10 degrees from 0 (ahead) to 180 (astern).
-
-    Lengths in m, projected areas above the water in m2; `length` is overall,
-    `perimeter` that of the lateral projection without waterline, masts and ventilators,
-    `bow_to_centroid` reaches to the centroid of the lateral area, `masts` are groups of
-    masts seen from the side, `superstructure_area` is that of the lateral area. Returns
-    CX by frontal area; CY to lee by lateral area; CN with the bow to lee by lateral
-    area and length; three arrays of shape (19,).
-    """
-    outline = [
-        1.0,
-        2.0 * lateral_area / length**2,
-        2.0 * frontal_area / beam**2,
-        length / beam,
-        perimeter / length,
-        bow_to_centroid / length,
-    ]
-    CX = -ISHERWOOD["CX"] @ np.array([*outline, masts])
-    CY = ISHERWOOD["CY"] @ np.array([*outline, superstructure_area / lateral_area])
-    CN = ISHERWOOD["CN"] @ np.array(outline)
-    return CX, CY, CN

@@ -325,7 +325,7 @@ def test_wind_without_what_it_needs(mariner: ShipModel) -> None:
     with pytest.raises(
         InputError, match="weather without the particulars it needs: beam"
     ):
-        in_still_water([run], bare, wind="isherwood")
+        in_still_water([run], bare, wind="blendermann")
     (found,), report = in_still_water([run], bare)
     assert "wind_udot" not in found
     assert report["sea_remarks"][0].startswith(
@@ -335,7 +335,9 @@ def test_wind_without_what_it_needs(mariner: ShipModel) -> None:
         InputError, match="wind: expected columns wind_speed and wind_from"
     ):
         in_still_water(
-            [zigzag(mariner, 10, 10, duration=200.0, dt=1.0)], bare, wind="isherwood"
+            [zigzag(mariner, 10, 10, duration=200.0, dt=1.0)],
+            bare,
+            wind="blendermann",
         )
 
 

@@ -1,25 +1,20 @@
 """Weather in simulations, manoeuvres and the course-keeping environment."""
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
 
 import gymnasium
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
-from scipy.signal import bilinear, lfilter
 
 import shipgym
 from shipgym import InputError, manoeuvres
 from shipgym.engine import random
 from shipgym.engine.motion import Motion
 from shipgym.envs.engine import Engine
-from shipgym.instruments import bridge
-from shipgym.models.simulate import Conditions, Passage, open_loop, simulate
+from shipgym.models.simulate import simulate
 from shipgym.sea import (
     AIR_DENSITY,
     Current,
@@ -27,18 +22,16 @@ from shipgym.sea import (
     Weather,
     Wind,
     filters,
-    gust_filter,
     open_sea,
     series,
     wave_motion,
     wind_curves,
 )
-from shipgym.sea.drift import wave_drift
 from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.open_sea import Sea, SeaParameters
+from shipgym.sea.wind import gust_filter
 from shipgym.tasks.task import course_keeping_task
 from shipgym.trials.sensors import Sensors
-from tests.shipgym.outer import outer
 
 GALE = Weather(
     current=Current(1.0, 90.0, 0.2, 300.0),
@@ -108,16 +101,6 @@ def test_a_constant_current_is_a_moving_frame(mariner):
     )
 
 
-def test_a_ship_is_carried_along_by_a_varying_current(mariner):
-    trial, still = (
-        ahead(mariner, Weather(current=Current(0.0, 0.0, 0.5, 100.0))),
-        ahead(mariner),
-    )
-    np.testing.assert_array_equal(trial["u"], still["u"])
-    carried = np.concatenate([[0.0], np.cumsum(0.5 * trial["current_north"][:-1])])
-    np.testing.assert_allclose(trial["x"] - still["x"], carried, atol=1e-8)
-
-
 @pytest.mark.parametrize("from_deg", [0.0, 30.0, 90.0, 150.0, -120.0])
 def test_the_first_push_of_the_wind_is_its_force_by_the_inertia(mariner, from_deg):
     body, at_rest = inert(mariner)
@@ -138,26 +121,6 @@ def test_the_first_push_of_the_wind_is_its_force_by_the_inertia(mariner, from_de
     assert np.all(np.abs(felt - expected[:3]) < 0.04 * scale[:3])  # six harmonics
 
 
-def test_waves_push_by_the_mean_drift_force_times_one_plus_its_variation(mariner):
-    body, at_rest = inert(mariner)
-    waves = Waves(3.0, 9.0, 60.0)
-    passage, pushes = Passage(body, Conditions(weather=Weather(waves=waves)), 1e-3), []
-    for word in range(300):
-        passage.sea[1][0] = word
-        states = passage.states(at_rest, 2)
-        passage.loop("simulate")(
-            states, np.zeros((2, 2)), 1e-3, *passage.sea, passage.numbers
-        )
-        pushes.append(states[1, 4])
-    drift = wave_drift(waves, mariner.particulars)
-    at = np.argmin(np.abs(drift.chi - np.radians(60.0)))
-    mean = (mobility_matrix(mariner) @ [drift.X[at], drift.Y[at], drift.N[at], 0.0])[
-        1
-    ] * 1e-3
-    assert np.mean(pushes) == pytest.approx(mean, rel=4.0 / np.sqrt(300))
-    assert np.std(pushes) == pytest.approx(abs(mean), rel=4.0 / np.sqrt(600))
-
-
 def test_weather_from_port_is_the_mirror_image_of_that_from_starboard(mariner):
     crooked = [name for name in mariner.coefficients if name[:3] in ("Y_0", "N_0")]
     symmetric = replace(
@@ -172,14 +135,6 @@ def test_weather_from_port_is_the_mirror_image_of_that_from_starboard(mariner):
         np.testing.assert_allclose(
             port[name], sign.get(name, 1.0) * starboard[name], rtol=1e-9, atol=1e-9
         )
-
-
-def test_head_wind_slows_and_following_wind_does_not(mariner):
-    calm, head, stern = (
-        ahead(mariner, weather, 60)["u"][-1]
-        for weather in (None, steady_wind(0.0), steady_wind(180.0))
-    )
-    assert head < calm < stern
 
 
 def test_wind_and_waves_from_abeam_set_a_ship_to_leeward(mariner):
@@ -256,39 +211,6 @@ def test_heading_in_waves_has_the_variance_and_the_rhythm_of_the_filter(mariner,
     )
 
 
-def test_waves_roll_a_ship_that_can_roll():
-    trial = shipgym.load_model("container").simulate(
-        np.tile([0.0, 1.0], (2000, 1)),
-        0.5,
-        weather=Weather(waves=Waves(3.0, 9.0, 90.0)),
-    )
-    assert trial["phi_wave"].std() > 0.0
-    assert "phi_wave" not in ahead(shipgym.load_model("mariner"), GALE, 2).channels
-
-
-def test_numbers_of_the_generator_are_normal():
-    stream, normal = outer(random.rng_state), outer(random.normal)
-    words = [np.uint64(stream(np.uint64(7), np.uint64(k))) for k in range(4)]
-    z = np.array([normal(word, draw) for word in words for draw in random.DRAW])
-    assert len(set(z.tolist())) == len(z)
-    trial = ahead(
-        shipgym.load_model("mariner"),
-        Weather(current=Current(0.0, 0.0, 1.0, 1e-6)),
-        40000,
-        0.1,
-    )
-    white = np.concatenate([trial["current_north"], trial["current_east"]])
-    n = len(white)
-    assert abs(white.mean()) < 4.0 / np.sqrt(n)
-    assert white.var() == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / n))
-    assert np.mean(white**3) == pytest.approx(0.0, abs=4.0 * np.sqrt(15.0 / n))
-    assert np.mean(white**4) == pytest.approx(3.0, abs=4.0 * np.sqrt(96.0 / n))
-    assert np.mean(np.abs(white) > 3.0) == pytest.approx(
-        0.0027, abs=4.0 * np.sqrt(0.0027 / n)
-    )
-    assert abs(np.mean(white[1:] * white[:-1])) < 4.0 / np.sqrt(n)
-
-
 NO_SINES, NO_COSINES = series.Sines(*[0.0] * 6), series.Cosines(*[0.0] * 7)
 NO_FILTER = filters.Filter(1.0, 0.0, 0.0)
 
@@ -315,51 +237,6 @@ def parameters(**given):
 angle, few = st.floats(-3.1, 3.1), st.floats(-2.0, 2.0)
 
 
-@given(angle, st.lists(few, min_size=7, max_size=7))
-def test_series_over_an_angle_are_fouriers(angle, a):
-    cosine, sine, k = np.cos(angle), np.sin(angle), np.arange(1, 7)
-    expected = a[0] + np.cos(k * angle) @ a[1:]
-    assert series.sum_of_cosines(cosine, series.Cosines(*a)) == pytest.approx(
-        expected, abs=1e-9
-    )
-    sines = series.sum_of_sines(cosine, sine, series.Sines(*a[1:]))
-    assert sines == pytest.approx(np.sin(k * angle) @ a[1:], abs=1e-9)
-
-
-def test_what_decays_does_so_exponentially_and_is_gone_after_eight_time_constants():
-    x = np.linspace(0.0, 1.0, 41)
-    np.testing.assert_allclose(
-        [filters.decay(one) for one in x], np.exp(-x), rtol=0.0, atol=1.2e-9
-    )
-    assert filters.decay(2.0) == pytest.approx(np.exp(-2.0), abs=1e-6)
-    assert filters.decay(20.0) == filters.decay(8.5) == filters.decay(8.0) < 4e-4
-    assert filters.decay(7.9) > filters.decay(8.0)
-
-
-def test_a_ship_meets_the_waves_at_a_tenth_of_their_frequency_at_least():
-    """In a following sea she may sail along with them: U = g / w."""
-    p = parameters()
-    w, k = p.wave_frequency, p.wave_number
-    for speed, met in (
-        (0.0, w),
-        (0.5 * w / k, 0.5 * w),
-        (0.89 * w / k, 0.11 * w),
-        (0.91 * w / k, 0.1 * w),
-        (w / k, 0.1 * w),
-        (1.09 * w / k, 0.1 * w),
-        (3.0 * w / k, 2.0 * w),
-    ):
-        assert open_sea.encounter(
-            open_sea.FromBow(-1.0, 0.0), speed, 0.3, p
-        ) == pytest.approx(met)
-        assert open_sea.encounter(
-            open_sea.FromBow(0.0, -1.0), 0.3, speed, p
-        ) == pytest.approx(met)
-    assert open_sea.encounter(
-        open_sea.FromBow(0.6, 0.8), 5.0, -2.0, p
-    ) == pytest.approx(w + k * (3.0 - 1.6))
-
-
 @given(st.floats(0.0, 2.0))
 def test_an_oscillator_in_waves_steps_exactly(turn):
     """Its transition is the matrix exponential; its noise keeps both variances at 1."""
@@ -375,73 +252,6 @@ def test_an_oscillator_in_waves_steps_exactly(turn):
     np.testing.assert_allclose(
         stepped, exact @ [0.3, -0.7] + noise @ [0.5, 1.1], atol=1e-6
     )
-
-
-@given(angle, angle, few, few, st.floats(0.0, 15.0), few)
-def test_wind_and_waves_push_by_where_they_come_from(psi, blows, u, v, speed, gust):
-    """Worked with vectors north and east.
-
-    The air that the ship meets, and the waves from the bow.
-    """
-    nothing = [0.0] * 4
-    p = parameters(
-        wind_speed=speed,
-        still_air=0.01,
-        wind_surge=series.Cosines(0.2, -0.5, 0.0, *nothing),
-        wind_sway=series.Sines(0.9, 0.0, *nothing),
-        wind_yaw=series.Sines(0.0, 0.3, *nothing),
-        wind_roll=series.Sines(0.6, 0.0, *nothing),
-        drift_surge=series.Cosines(-0.4, 0.1, 0.0, *nothing),
-        drift_sway=series.Sines(0.7, 0.0, *nothing),
-        drift_yaw=series.Sines(0.0, 0.2, *nothing),
-        drift_roll=series.Sines(0.8, 0.0, *nothing),
-    )
-    current, waves_from = 0.7 - 0.4j, blows + 0.5
-    state = {
-        "wind_north": np.cos(blows),
-        "wind_east": np.sin(blows),
-        "waves_north": np.cos(waves_from),
-        "waves_east": np.sin(waves_from),
-        "current_north": current.real,
-        "current_east": current.imag,
-        "gust": gust,
-        "drift": 0.25,
-    }
-    sea = Sea(**dict.fromkeys(Sea._fields, 0.0) | state)
-    motion = Motion(0.0, 0.0, psi, u, v, *[0.0] * 6)
-    true_wind = (speed + gust) * np.exp(1j * blows)
-    met = true_wind + current + (u + 1j * v) * np.exp(1j * psi)
-    assume(abs(met) > 1e-3)
-    felt, size, bow = np.angle(met) - psi, abs(met) ** 2, waves_from - psi
-
-    found = open_sea.push(motion, sea, p)
-    by_wind = size * (0.2 - 0.5 * np.cos(felt)) + 0.01 * u * abs(u)
-    by_waves = 1.25 * (-0.4 + 0.1 * np.cos(bow))
-    sway = size * 0.9 * np.sin(felt) + 1.25 * 0.7 * np.sin(bow)
-    yaw = size * 0.3 * np.sin(2.0 * felt) + 1.25 * 0.2 * np.sin(2.0 * bow)
-    roll = size * 0.6 * np.sin(felt) + 1.25 * 0.8 * np.sin(bow)
-    assert found.u == pytest.approx(by_wind + by_waves, abs=1e-6)
-    assert (found.v, found.r, found.p) == pytest.approx((sway, yaw, roll), abs=1e-6)
-    assert (found.north, found.east) == (current.real, current.imag)
-    ahead = u * np.cos(bow) + v * np.sin(bow)
-    met_at = max(abs(0.628 + 0.628**2 / 9.81 * ahead), 0.0628)
-    assert open_sea.encounter_frequency(motion, sea, p) == pytest.approx(met_at)
-
-
-def test_what_the_instruments_filter_takes_away_is_a_band_of_scipys():
-    """Notch (s^2 + 0.2 w s + w^2) / (s^2 + 1.4 w s + w^2), its frequency kept (Fossen
-    11.1.2).
-    """
-    turn, signal = 0.4, np.random.default_rng(0).standard_normal(200)
-    w = 2.0 * np.tan(0.5 * turn)
-    b, a = bilinear([1.0, 0.2 * w, w * w], [1.0, 1.4 * w, w * w], fs=1.0)
-    rest = np.concatenate([np.zeros(2), signal - signal[0]])
-    expected = signal - (lfilter(b, a, rest)[2:] + signal[0])
-    memory, taken = bridge.Notch(0.0, 0.0, 0.0, 0.0), []
-    for k, value in enumerate(signal):
-        memory = bridge.notched(value, turn, k == 0, memory)
-        taken.append(memory.taken_1)
-    np.testing.assert_allclose(taken, expected, atol=1e-12)
 
 
 def test_a_sea_begins_and_goes_on_as_it_always_was():
@@ -524,13 +334,6 @@ def test_instruments_show_the_motion_in_waves(mariner):
     assert set(logged.channels) == {*STATE, "delta_command"}
 
 
-def test_prediction_of_a_trial_knows_no_weather(mariner):
-    trial = ahead(mariner, rudder=0.1)
-    np.testing.assert_allclose(
-        open_loop(mariner, trial)["psi"], trial["psi"], atol=1e-3
-    )
-
-
 @pytest.mark.parametrize(
     "run",
     [
@@ -572,14 +375,6 @@ def test_each_lane_of_a_rough_sea_is_the_single_environment(mariner):
     assert len(np.unique(large.physical_state()["wind_from"])) == 70
 
 
-def test_lanes_with_ships_of_their_own_and_the_same_weather(mariner):
-    several, one = engine([mariner] * 5, 5), engine(mariner, 5)
-    several.reset(np.arange(5)), one.reset(np.arange(5))
-    for _ in range(20):
-        observations = [e.step(np.full((5, 1), 0.1))[0] for e in (several, one)]
-    np.testing.assert_array_equal(*observations)
-
-
 def test_the_environment_shows_the_measured_and_rewards_the_slow_heading(mariner):
     rough = engine(mariner, 8)
     rough.reset(np.arange(8))
@@ -598,28 +393,6 @@ def test_the_environment_shows_the_measured_and_rewards_the_slow_heading(mariner
     )
 
 
-def test_the_sea_changes_no_task(mariner):
-    rough, calm = engine(mariner, 4), engine(mariner, 4, "calm")
-    for e in (rough, calm):
-        e.reset(np.arange(4))
-    np.testing.assert_array_equal(
-        rough.physical_state()["set_point"], calm.physical_state()["set_point"]
-    )
-
-
-def test_a_finished_lane_stays_in_weather(mariner):
-    short = engine(mariner, 2, episode_steps=4)
-    for _ in range(4):
-        short.step(np.zeros((2, 1)))
-    before, observations = short.physical_state(), short.observations
-    after, *_ = short.step(np.ones((2, 1)))
-    for name, value in short.physical_state().items():
-        np.testing.assert_array_equal(value, before[name])
-    np.testing.assert_array_equal(
-        np.delete(after, 6, axis=1), np.delete(observations, 6, axis=1)
-    )
-
-
 def test_given_directions_are_kept_and_open_ones_are_drawn_anew(mariner):
     given = engine(mariner, 3, GALE)
     assert given.physical_state()["wind_from"] == pytest.approx(np.pi / 4)
@@ -634,35 +407,6 @@ def test_given_directions_are_kept_and_open_ones_are_drawn_anew(mariner):
     first = env.physical_state()["wind_from"]
     env.reset()
     assert env.physical_state()["wind_from"] != first
-
-
-RUN = """
-import numpy as np, shipgym
-from shipgym.envs.engine import Engine
-from shipgym.tasks.task import course_keeping_task
-engine = Engine(shipgym.load_model("mariner"), 2, course_keeping_task(sea="rough"))
-engine.reset([1, 2])
-for k in range(30):
-    observations, *_ = engine.step(np.full((2, 1), np.sin(k)))
-ship = shipgym.load_model("mariner")
-trial = ship.simulate(np.full((50, 1), 0.2), 0.5, weather="rough")
-last = [float(trial[name][-1]) for name in ("r_wave", "psi")]
-print(repr([*observations[1].tolist(), *last]))
-"""
-
-
-def test_without_compiling_the_weather_is_the_same():
-    runs = [
-        subprocess.run(
-            [sys.executable, "-c", RUN],
-            env={**os.environ, **extra},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
-        for extra in ({}, {"NUMBA_DISABLE_JIT": "1"})
-    ]
-    np.testing.assert_allclose(eval(runs[0]), eval(runs[1]), rtol=1e-6, atol=1e-8)
 
 
 def test_wrong_weather(mariner):
