@@ -2,7 +2,6 @@
 
     python scripts/train_pretrained.py                              # missing runs
     python scripts/train_pretrained.py --tasks roll-limit --seeds 0,1
-    python scripts/train_pretrained.py --table results       # for docs/pretrained.md
 
 Each task is learned with its settings in `agents/training/hyperparameters`, once for
 each training seed, in the design model and over the models drawn from its covariance.
@@ -10,25 +9,19 @@ Of each run the policy that costs least on held-out episodes of the model is kep
 runs are all shipped and all scored, none is chosen. All tasks learn with the first seed
 before any learns with the second, so that a set that was cut short is balanced. Killed
 at any moment, it goes on where it was.
-
-`results` is a folder of `shipgym benchmark` with the agents and the baselines.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from agents.agent_file import PRETRAINED, load_agent
-from agents.benchmarking.results import BenchmarkResult, load_results
-from agents.benchmarking.sources import BEST_KNOWN
-from agents.benchmarking.statistics import ConfidenceInterval, Draws, gain_over
 from agents.policies.policy import LearnedPolicy
-from agents.suites.suite import SETS, BenchmarkTask, find_task, load_suite
+from agents.suites.suite import BenchmarkTask, find_task, load_suite
 from agents.training import run_folder
 from agents.training.evaluation import TrainingProgress
 from agents.training.plan import TrainingRequest, make_plan
@@ -37,25 +30,11 @@ from shipgym.files import read_json, write_json
 
 RESULT = "result.json"
 LARGEST_KB = 300.0
-SLOW = "mpc"  # of the baselines, which no policy adds to
-GAIN, CLOSE = 0.05, 0.01  # what is asked of five tasks, and of the others
 PROGRESS_S = 10.0  # between lines
-HEADS = (
-    "task",
-    "best baseline",
-    "its cost",
-    "agents, by training seed",
-    "gain on the ship, %",
-    "on the model",
-    "far from the design",
-    "lost far: agents, baseline",
-    "gain over the best other than MPC",
-    "aim",
-)
 
 
 def main() -> None:
-    """Train what is missing, or print the table."""
+    """Train what is missing."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
@@ -65,16 +44,9 @@ def main() -> None:
     parser.add_argument(
         "--runs", type=Path, default=Path("runs/pretrained"), help="folder of the runs"
     )
-    parser.add_argument(
-        "--table", type=Path, help="only print what the agents cost in these results"
-    )
     arguments = parser.parse_args()
     tasks = load_suite().select(arguments.tasks)
     names = [task.name for task in tasks if task.on == "ship"]
-    if arguments.table:
-        result = load_results(arguments.table)
-        print_table(result, names, arguments.algorithm)
-        return
     for seed in map(int, arguments.seeds.split(",")):
         for name in names:
             run = Run(arguments.algorithm, find_task(name), seed, arguments.runs)
@@ -155,60 +127,6 @@ class Run:
                 f"{path}: expected at most {LARGEST_KB:.0f} kB with its weights, got"
                 f" {size_kb:.0f}"
             )
-
-
-def print_table(result: BenchmarkResult, tasks: list[str], algorithm: str) -> None:
-    """Print the best baseline, every training seed and the gain, a row a task."""
-    print(f"| {' | '.join(HEADS)} |")
-    print(f"|{' --- |' * len(HEADS)}")
-    draws = Draws(len(tasks), result.summary["seeds"]["count"])
-    for number, task in enumerate(tasks):
-        best = best_baseline(result, task, algorithm)
-        fast = best_baseline(result, task, algorithm, without=SLOW)
-        gains = {}
-        for on, end in SETS.items():
-            learned = result.figures(algorithm, task + end)
-            baseline = result.figures(best, task + end)
-            gains[on] = gain_over(learned, baseline, draws, number)
-        learned = result.figures(algorithm, task)
-        over_fast = gain_over(learned, result.figures(fast, task), draws, number)
-        lost = [
-            result.figures(name, f"{task}-far", "terminated").mean()
-            for name in (algorithm, best)
-        ]
-        cells = [
-            task,
-            best,
-            f"{result.figures(best, task).mean():.1f}",
-            ", ".join(f"{cost:.1f}" for cost in learned.mean(axis=1)),
-            *map(shown, gains.values()),
-            ", ".join(f"{share:.0%}" for share in lost),
-            f"{shown(over_fast)} {fast}",
-            aim_of(gains["ship"]),
-        ]
-        print(f"| {' | '.join(cells)} |")
-
-
-def best_baseline(
-    result: BenchmarkResult, task: str, algorithm: str, without: str = ""
-) -> str:
-    """Return the controller of the lowest mean cost that is not learned."""
-    cells: Mapping[str, Any] = result.summary["tasks"][task]
-    baselines = set(cells) - {algorithm, BEST_KNOWN, without}
-    return min(baselines, key=lambda name: float(cells[name]["cost"]["value"]))
-
-
-def aim_of(gain: ConfidenceInterval) -> str:
-    """Tell whether an aim is met, and which."""
-    if gain.value >= GAIN and gain.low > 0.0:
-        return "gain"
-    return "near" if gain.value >= -CLOSE else "missed"
-
-
-def shown(gain: ConfidenceInterval) -> str:
-    """Write a gain with its interval, in percent."""
-    value, low, high = (100.0 * share for share in gain)
-    return f"{value:.1f} ({low:.1f} to {high:.1f})"
 
 
 if __name__ == "__main__":

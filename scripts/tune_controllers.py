@@ -18,8 +18,13 @@ from typing import Any
 import numpy as np
 
 from agents.controllers.designs import INNER
-from agents.suites.reference import load_tuned
-from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, suite_file
+from agents.suites.suite import (
+    DEFAULT_SUITE,
+    BenchmarkTask,
+    load_suite,
+    load_tuned,
+    suite_file,
+)
 from agents.training.controller_search import (
     FIRST_SEED,
     FoundSettings,

@@ -1,50 +1,24 @@
 """Cells of a benchmark: one controller in one task, all of its training runs."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from types import NoneType
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from typing import Any, Self
 
 import numpy as np
+import pandas as pd
 
-from agents.benchmarking.entries import Entry
-from agents.benchmarking.sources import BEST_KNOWN, file_hash, policy_hash
-from agents.controllers.interface import Policy
-from agents.suites.reference import best_costs
-from agents.suites.suite import BenchmarkTask
+from agents.benchmarking.entries import Entry, file_hash
+from agents.suites.suite import FIRST_SEED, BenchmarkTask
 from shipgym.arrays import Floats
 from shipgym.checks import ANY_KEY, Shape, check_shape
 from shipgym.errors import InputError
 
-RUN: Shape = {
+CELL: Shape = {
+    "refused": (str,),
     "figures": {ANY_KEY: (np.ndarray,)},
     "failure": (str,),
     "seconds_per_action": (int, float),
-    "policy_sha256": (str, NoneType),
 }
-CELL: Shape = {"refused": (str,), "runs": [RUN]}
-
-
-@dataclass(frozen=True, eq=False)
-class ScoredRun:
-    """Scored episodes of one training run; a controller that does not learn has one.
-
-    Attributes
-    ----------
-    figures : mapping of str to array of shape (n_episodes,)
-        Figures of each episode by name (`agents.rollouts.metrics`).
-    failure : str
-        How the controller failed first; empty if it did not.
-    seconds_per_action : float
-        Processor time of a command.
-    policy_sha256 : str or None
-        Hash of the controller's file; None for one that has no file.
-    """
-
-    figures: Mapping[str, Floats]
-    failure: str = ""
-    seconds_per_action: float = np.nan
-    policy_sha256: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,30 +27,38 @@ class Cell:
 
     Attributes
     ----------
-    runs : sequence of ScoredRun
-        None where it could not run the task.
     refused : str
-        Why it could not; empty if it could.
+        Why it could not run the task; empty if it could.
+    figures : mapping of str to array of shape (n_runs, n_episodes)
+        Figures of each episode by name (`agents.rollouts.metrics`), for each training
+        run; a controller that does not learn has one.
+    failure : str
+        How the controller failed first; empty if it did not.
+    seconds_per_action : float
+        Processor time of a command, mean over the runs.
     """
 
-    runs: Sequence[ScoredRun] = ()
     refused: str = ""
+    figures: Mapping[str, Floats] = field(default_factory=dict)
+    failure: str = ""
+    seconds_per_action: float = np.nan
 
     @property
     def costs(self) -> Floats:
-        """Cost of each episode, shape (n_runs, n_episodes)."""
-        return np.stack([run.figures["cost"] for run in self.runs])
+        """Cost of each episode, shape (n_runs, n_episodes); no runs where refused."""
+        return self.figures.get("cost", np.zeros((0, 0)))
 
-    def count(self, figure: str) -> int:
-        """Return the number of episodes in which a figure is true."""
-        counts = [np.nansum(run.figures.get(figure, 0.0)) for run in self.runs]
-        return int(sum(counts))
-
-    def values(self, figure: str) -> Floats:
-        """Return a figure of all episodes that have it."""
-        values = np.concatenate([run.figures[figure] for run in self.runs])
-        finite: Floats = values[np.isfinite(values)]
-        return finite
+    def table(self, controller: str, task: str) -> pd.DataFrame:
+        """Return a row for each run and episode, with its seed."""
+        n_runs, n_episodes = self.costs.shape
+        keys = {
+            "controller": controller,
+            "task": task,
+            "run": np.repeat(np.arange(n_runs), n_episodes),
+            "seed": np.tile(FIRST_SEED + np.arange(n_episodes), n_runs),
+        }
+        figures = {name: values.ravel() for name, values in self.figures.items()}
+        return pd.DataFrame({**keys, **figures})
 
     @classmethod
     def from_dict(cls, content: Any, n_episodes: int, where: str) -> Self:
@@ -85,24 +67,18 @@ class Cell:
         Raises InputError, beginning with `where`, if it is not of so many episodes.
         """
         check_shape(content, CELL, where)
-        runs = [ScoredRun(**run) for run in content["runs"]]
-        for run in runs:
-            same_figures = run.figures.keys() == runs[0].figures.keys()
-            if not same_figures or not _has_figures(run, n_episodes):
-                raise InputError(
-                    f"{where}: expected cost and other figures of {n_episodes} episodes"
-                )
-        return cls(runs, content["refused"])
-
-
-def _has_figures(run: ScoredRun, n_episodes: int) -> bool:
-    """Return whether a run has costs, and only numbers of so many episodes."""
-    if "cost" not in run.figures:
-        return False
-    for figure in run.figures.values():
-        if figure.dtype.kind not in "bif" or figure.shape != (n_episodes,):
-            return False
-    return True
+        cell = cls(**content)
+        n_runs = len(cell.costs)
+        needed = {"cost", "terminated", "failed"}
+        whole = bool(cell.refused) or needed <= cell.figures.keys()
+        for values in cell.figures.values():
+            is_number = values.dtype.kind in "bif"
+            whole = whole and is_number and values.shape == (n_runs, n_episodes)
+        if not whole:
+            raise InputError(
+                f"{where}: expected cost and other figures of {n_episodes} episodes"
+            )
+        return cell
 
 
 #: Names of the controller and the task of a cell.
@@ -112,10 +88,9 @@ Cells = Mapping[CellName, Cell]
 
 def run_cell(entry: Entry, task: BenchmarkTask, n_episodes: int) -> Cell:
     """Run the first scored episodes of a task with every training run of an entry."""
+    from agents.rollouts.metrics import evaluate  # whoever shares work out does without
+
     try:
-        if entry.source == BEST_KNOWN:
-            costs = best_costs(task)[:n_episodes]
-            return Cell([ScoredRun({"cost": costs})])
         policies = entry.policies(task)
     except InputError as error:
         return Cell(refused=str(error))
@@ -124,18 +99,18 @@ def run_cell(entry: Entry, task: BenchmarkTask, n_episodes: int) -> Cell:
             raise
         # a user's own function may raise anything
         return Cell(refused=f"{type(error).__name__}: {error}")
-    return Cell([_run(policy, task, n_episodes) for policy in policies])
 
-
-def _run(policy: Policy, task: BenchmarkTask, n_episodes: int) -> ScoredRun:
-    from agents.rollouts.metrics import evaluate  # whoever shares work out does without
-
-    evaluation = evaluate(policy, task, task.seeds[:n_episodes])
-    return ScoredRun(
-        figures=evaluation.figures,
-        failure=evaluation.run.failure,
-        seconds_per_action=evaluation.run.seconds_per_action,
-        policy_sha256=policy_hash(policy),
+    seeds = task.seeds[:n_episodes]
+    sailed = [evaluate(policy, task, seeds) for policy in policies]
+    figures = {}
+    for name in sailed[0].figures:
+        figures[name] = np.stack([one.figures[name] for one in sailed])
+    failures = [one.run.failure for one in sailed if one.run.failure]
+    seconds = [one.run.seconds_per_action for one in sailed]
+    return Cell(
+        figures=figures,
+        failure=failures[0] if failures else "",
+        seconds_per_action=float(np.mean(seconds)),
     )
 
 

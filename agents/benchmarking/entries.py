@@ -5,39 +5,43 @@ A controller is named, on the command line and in Python, as
     pid                   a classical controller, designed for the model of each task
     tuned-pid             the same with the settings of direct search for the task
     tuned-best            of these, the one with the lowest cost in each task
-    best-known            the lowest known cost of each episode, kept with the suite
-    ppo                   the pretrained agents of agents/pretrained
+    ppo                   the shipped agents of agents/pretrained
     runs/agent.json       a file of an agent or controller
     runs/model.zip        an agent as stable-baselines3 saves it
     runs/{task}-*.json    one file for each task; several that match are training runs
-    a.json+b.json         training runs, file by file
     my_module:factory     a function that returns a controller for a `BenchmarkTask`,
                           or a subclass of `agents.Controller`; its code is run
     name=...              any of these under another name
 """
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+import glob
+import hashlib
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from agents.benchmarking.sources import (
-    Source,
-    check_module,
-    check_object,
-    file_hash,
-    known_names,
-    load_source,
-    make_policies,
-    make_policy,
-    matching_files,
-    names_code,
-    source_files,
-)
+from agents.agent_file import PRETRAINED, load_agent
+from agents.controllers.controller import Controller
+from agents.controllers.designs import design, tuned
 from agents.controllers.interface import Policy, check_fits, model_hash
+from agents.controllers.registry import (
+    CLASSICAL,
+    controller_class,
+    controller_kinds,
+    register_controller,
+)
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
+from shipgym.files import LARGEST_TENSORS, read_bytes
+from shipgym.python_files import working_folder
+
+LEARNED = ("ppo", "sac", "td3", "tqc")
+TUNED = "tuned-"
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,20 +70,28 @@ class Entry:
         """Return whether it is `module:function`, whose code is run."""
         return self.is_text and names_code(self.source)
 
-    def policies(self, task: BenchmarkTask) -> tuple[Policy, ...]:
+    @property
+    def is_file(self) -> bool:
+        """Return whether it is read from files that the user names."""
+        return self.is_text and not self.is_code and self.source not in known_names()
+
+    def policies(self, task: BenchmarkTask) -> list[Policy]:
         """Make its controllers for a task, one for each training run.
 
         Raises InputError if it cannot be made for this task, observes other quantities,
         or was designed on the ship that it should not know.
         """
         where = f"'{self.name}' on task '{task.name}'"
-        design = task.design_task
-        policies = make_policies(self.source, design)
+        given = task.design_task
+        policies = _policies(self.source, given)
         for policy in policies:
-            check_fits(policy, design.task, design.ship, where)
-            if task.true_ship:
-                _check_design(design_hashes(policy), task, where)
-        return tuple(policies)
+            check_fits(policy, given.task, given.ship, where)
+            if task.true_ship and _holds(policy, model_hash(task.evaluation.ship)):
+                raise InputError(
+                    f"{where}: expected a design on the model '{task.model}', got one"
+                    f" on the ship '{task.true_ship}'"
+                )
+        return policies
 
     def fingerprint(self, task: BenchmarkTask) -> dict[str, str]:
         """Return the SHA-256 of each file that it is made from for a task, by path."""
@@ -88,40 +100,23 @@ class Entry:
         return {str(path): file_hash(path) for path in source_files(self.source, task)}
 
 
-def _check_design(hashes: Collection[str], task: BenchmarkTask, where: str) -> None:
-    """Refuse a policy that was designed on the ship behind a task's model."""
-    true_ship = task.evaluation.ship
-    if model_hash(true_ship) in hashes:
-        raise InputError(
-            f"{where}: expected a design on the model '{task.model}', got one on the"
-            f" ship '{task.true_ship}'"
-        )
+def known_names() -> tuple[str, ...]:
+    """Names that stand for a controller, other than files and functions."""
+    tuned_names = [TUNED + kind for kind in ("best", *CLASSICAL)]
+    return (*controller_kinds(), *LEARNED, *tuned_names)
 
 
-def design_hashes(policy: Policy) -> set[str]:
-    """Hashes of the models that a policy and the policies within it were made for."""
-    hashes = set()
-    visited: set[int] = set()
-    waiting: list[Any] = [policy]
-    # Attributes of a policy that may be policies themselves, and how many are looked
-    # at.
-    inner_policies = ("policy", "fallback", "base", "autopilot")
-    most_inner_policies = 1000
-    while waiting:
-        part = waiting.pop()
-        if part is None or id(part) in visited:
-            continue
-        visited.add(id(part))
-        if len(visited) > most_inner_policies:
-            raise InputError(
-                f"{type(policy).__name__}: expected a policy made of at most"
-                f" {most_inner_policies} policies, got more"
-            )
+def names_code(text: str) -> bool:
+    """Return whether a text names a function, `module:function`."""
+    module, colon, function = text.rpartition(":")
+    parts = [*module.split("."), function]
+    return bool(colon) and all(part.isidentifier() for part in parts)
 
-        hashes.add(getattr(part, "model_sha256", ""))
-        for name in inner_policies:
-            waiting.append(getattr(part, name, None))
-    return hashes
+
+def file_hash(path: str | Path) -> str:
+    """Return the SHA-256 of a file; raises InputError if it cannot be read."""
+    content = read_bytes(Path(path), "file", LARGEST_TENSORS)
+    return hashlib.sha256(content).hexdigest()
 
 
 def read_entries(controllers: Any) -> tuple[Entry, ...]:
@@ -149,22 +144,37 @@ def read_entries(controllers: Any) -> tuple[Entry, ...]:
     return tuple(entries.values())
 
 
+def check_agents(entry: Entry, tasks: Sequence[BenchmarkTask]) -> None:
+    """Refuse files of agents that cannot be read or fit none of the tasks.
+
+    Called before anything is run. Raises InputError naming the file.
+    """
+    if not entry.is_file:
+        return
+    refusals = []
+    for task in tasks:
+        try:
+            entry.policies(task)
+        except InputError as error:
+            refusals.append(error)
+        else:
+            return
+    raise InputError(
+        f"controllers: '{entry.name}' fits none of the tasks: {refusals[0]}"
+    )
+
+
 def _each_entry(controllers: Any) -> Iterator[Entry]:
     if isinstance(controllers, Mapping):
         for name, source in controllers.items():
             yield _named(str(name), source)
-    else:
-        for given in _as_list(controllers):
-            yield _read_entry(given)
-
-
-def _as_list(controllers: Any) -> list[Any]:
+        return
     if isinstance(controllers, str):
-        return controllers.split(",")
-    is_policy = hasattr(controllers, "predict")
-    if is_policy or not isinstance(controllers, Iterable):
-        return [controllers]
-    return list(controllers)
+        controllers = controllers.split(",")
+    elif hasattr(controllers, "predict") or not isinstance(controllers, Iterable):
+        controllers = [controllers]
+    for given in controllers:
+        yield _read_entry(given)
 
 
 def _read_entry(given: Any) -> Entry:
@@ -175,7 +185,7 @@ def _read_entry(given: Any) -> Entry:
         if equals:
             return _named(name.strip(), source.strip())
         text = given.strip()
-        return Entry(_short_name(text), _checked_text(text))
+        return _named(_short_name(text), text)
 
     # an object is known by its name, a function by its own, others by their class
     own_name: Any = getattr(given, "name", None)
@@ -185,18 +195,14 @@ def _read_entry(given: Any) -> Entry:
 
 
 def _named(name: str, source: Any) -> Entry:
-    not_in_names = ",=/{}*"
-    forbidden = set(name) & set(not_in_names)
-    if not name or forbidden:
-        raise InputError(
-            f"controllers: expected a name without any of {' '.join(not_in_names)}, got"
-            f" '{name}'"
-        )
+    if not name:
+        raise InputError("controllers: expected a name before '=', got none")
     if isinstance(source, str):
-        return Entry(name, _checked_text(source))
+        _check_text(source)
+        return Entry(name, source)
     runs = source if isinstance(source, Sequence) else [source]
     for run in runs:
-        check_object(run, name)
+        _check_object(run, name)
     return Entry(name, source)
 
 
@@ -207,52 +213,148 @@ def _short_name(text: str) -> str:
         return function
     if not text.endswith((".json", ".zip")):
         return text
-    first_file, _, _ = text.partition("+")
-    stem = Path(first_file).stem
+    stem = Path(text).stem
     for wildcard in ("{task}", "*"):
         stem = stem.replace(wildcard, "")
     return stem.strip("-_.") or "agent"
 
 
-def _checked_text(text: str) -> str:
-    """Return a text that names a known controller, a function, or files."""
+def _check_text(text: str) -> None:
+    """Refuse a text that names no controller, function or file; nothing is run."""
     known = known_names()
     if text in known or "{task}" in text:
-        return text
+        return
     if names_code(text):
-        check_module(text)
-        return text
-    if not all(matching_files(pattern) for pattern in text.split("+")):
+        package, _, _ = text.partition(":")
+        top, _, _ = package.partition(".")
+        with working_folder():
+            found = top in sys.modules or find_spec(top) is not None
+        if not found:
+            raise InputError(
+                f"controllers: expected module:function, got '{text}', whose module"
+                f" '{top}' is not found in this folder or on Python's path"
+            )
+    elif not _matching_files(text):
         raise InputError(
             f"controllers: expected one of {quoted(known)}, an existing file of an"
             f" agent, or module:function, got '{text}'.{did_you_mean(text, known)}"
         )
-    return text
 
 
-def check_agents(entry: Entry, tasks: Sequence[BenchmarkTask]) -> None:
-    """Refuse files of agents that cannot be read or fit none of the tasks.
-
-    Called before anything is run. Raises InputError naming the file.
-    """
-    if not entry.is_text or entry.is_code:
-        return
-    sources: dict[Path, Source] = {}
-    refusals: list[InputError] = []
-    fits_one = False
-    for task in tasks:
-        for path in source_files(entry.source, task):
-            if path not in sources:
-                sources[path] = load_source(path)
-            try:
-                policy = make_policy(sources[path], task)
-                where = f"'{path}' on task '{task.name}'"
-                check_fits(policy, task.task, task.ship, where)
-                fits_one = True
-            except InputError as error:
-                refusals.append(error)
-
-    if refusals and not fits_one:
+def _check_object(source: Any, name: str) -> None:
+    """Refuse an object that is neither a controller nor a function."""
+    is_policy = callable(getattr(source, "predict", None))
+    if not is_policy and not callable(source):
         raise InputError(
-            f"controllers: '{entry.name}' fits none of the tasks: {refusals[0]}"
+            f"controllers: '{name}': expected a controller (with `predict`), a function"
+            f" that makes one for a task, or a text such as 'pid', got {source!r}"
         )
+
+
+def _policies(source: Any, task: BenchmarkTask) -> list[Policy]:
+    """Make the controllers of a source for a design task."""
+    if not isinstance(source, str):
+        runs = source if isinstance(source, Sequence) else [source]
+        return [_policy(run, task) for run in runs]
+    if names_code(source):
+        return [_policy(_imported(source), task)]
+    if source in controller_kinds():
+        return [_designed(source, task)]
+    if source.startswith(TUNED):
+        return [tuned(source.removeprefix(TUNED), task, task.suite)]
+
+    files = source_files(source, task)
+    if not files:
+        what = f"shipped {source} agent" if source in LEARNED else f"file '{source}'"
+        raise InputError(f"there is no {what} for task '{task.name}'")
+    return [_read_policy(path, task) for path in files]
+
+
+def _policy(source: Any, task: BenchmarkTask) -> Policy:
+    """Return a policy itself, what a function makes, or a class of controllers'."""
+    policy = source
+    if isinstance(source, type) and issubclass(source, Controller):
+        policy = design(register_controller(source).kind, task)
+    elif not hasattr(source, "predict"):
+        policy = source(task)
+    if not callable(getattr(policy, "predict", None)):
+        name = getattr(source, "__name__", source)
+        raise InputError(
+            f"{name}: expected a controller with `predict` for task '{task.name}', got"
+            f" {policy!r}"
+        )
+    return policy  # type: ignore[no-any-return]
+
+
+def _designed(kind: str, task: BenchmarkTask) -> Policy:
+    """Design a controller; without a path, the LQ that guidance leads."""
+    if controller_class(kind).has_autopilot and not task.task.follows_path:
+        kind = "lq"
+    return design(kind, task)
+
+
+def _read_policy(path: Path, task: BenchmarkTask) -> Policy:
+    if path.suffix != ".zip":
+        return load_agent(path)
+    from agents.policies.sb3_zip import read_sb3
+
+    return read_sb3(path).policy(task.task, task.ship)
+
+
+def _imported(text: str) -> Any:
+    """Import the function or class that a text names."""
+    module, _, name = text.rpartition(":")
+    try:
+        with working_folder():
+            found = getattr(import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise InputError(
+            f"controllers: expected module:function, got '{text}', which cannot be"
+            f" imported ({error})"
+        ) from None
+    _check_object(found, text)
+    return found
+
+
+def _holds(policy: Any, sha256: str, depth: int = 4) -> bool:
+    """Return whether a policy, or one within it, was made for a model of this hash."""
+    if policy is None or depth == 0:
+        return False
+    if getattr(policy, "model_sha256", "") == sha256:
+        return True
+    inner = ("policy", "fallback", "base", "autopilot")  # that may be policies
+    parts = [getattr(policy, name, None) for name in inner]
+    return any(_holds(part, sha256, depth - 1) for part in parts)
+
+
+def source_files(text: str, task: BenchmarkTask) -> list[Path]:
+    """Files from which a text's controllers are made for a task, in order."""
+    if names_code(text):
+        return _module_files(text)
+    name = task.design_name or task.name
+    if text in LEARNED:
+        folder = glob.escape(str(PRETRAINED))
+        for trained_for in (name, task.environment):
+            files = _matching_files(f"{folder}/{glob.escape(trained_for)}-{text}*.json")
+            if files:
+                return files
+    if text in known_names():
+        return []
+    return _matching_files(text.replace("{task}", name))
+
+
+def _module_files(text: str) -> list[Path]:
+    """File of the module that a function is named in; empty where it has none."""
+    module, _, _ = text.rpartition(":")
+    inside = Path(*module.split("."))
+    candidates = (inside.with_suffix(".py"), inside / "__init__.py")
+    for folder in (Path.cwd(), *map(Path, sys.path)):
+        for candidate in candidates:
+            if (folder / candidate).is_file():
+                return [folder / candidate]
+    return []
+
+
+def _matching_files(pattern: str) -> list[Path]:
+    paths = [Path(path) for path in sorted(glob.glob(pattern))]  # noqa: PTH207 - whole paths
+    return [path for path in paths if path.is_file()]

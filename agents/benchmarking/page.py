@@ -1,259 +1,130 @@
-"""The page of a benchmark: one HTML file with tables, figures and replays."""
+"""The page of a benchmark: one HTML file with tables, a figure and the method."""
 
-import base64
-import gzip
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from agents.benchmarking.episode_figures import histories_figure, tracks_figure
-from agents.benchmarking.page_figures import (
-    costs_figure,
-    looks,
-    profile_figure,
-    scores_figure,
-)
-from agents.benchmarking.page_replays import (
-    hardest_seed,
-    replay_data,
-    replayable,
-    usable_controllers,
-)
-from agents.benchmarking.page_tables import (
-    costs_table,
-    gains_table,
-    improvement_table,
-    metrics_table,
-    ranking_table,
-)
-from agents.benchmarking.replays import EpisodeId, Rerun, rerun
-from agents.benchmarking.results import RESULTS, BenchmarkResult
+from agents.benchmarking.results import BenchmarkResult
 from agents.output import check_page
+from agents.suites.limits import LIMITED_FIGURES
 from agents.suites.suite import N_EPISODES
-from identification.progress import Progress
-from shipgym.envs.episode import Episode
 from shipgym.files import write_text
 from shipgym.pages import render
-from shipgym.pages.numbers import counted
-from shipgym.plots.style import Figure
+from shipgym.pages.numbers import counted, number
+from shipgym.plots import MUTED, Panel, axis, graph_objects, panels
+from shipgym.plots.style import Figure, line_styles
 
 
-class PageFigure(NamedTuple):
-    """Figure of the page, which its script draws when it comes into sight."""
+class Metric(NamedTuple):
+    """Column of a task's table: a figure of `agents.rollouts.metrics`."""
 
-    name: str  # id, unique in the page
-    caption: str
-    height: int  # pixels
-    data: str  # packed JSON
+    name: str
+    title: str
 
 
-def write_page(
-    result: BenchmarkResult,
-    path: str | Path,
-    controllers: Any = None,
-    worst: int = 3,
-    workers: int | None = 1,
-    progress: Progress | None = None,
-) -> None:
-    """Write the page of a benchmark. The worst episodes are run again for it.
+METRICS = (
+    Metric("heading_rmse_deg", "heading RMSE, deg"),
+    Metric("cross_track_rmse_m", "cross-track RMSE, m"),
+    Metric("rudder_travel_deg_min", "rudder travel, deg/min"),
+    Metric("rudder_reversals_min", "rudder reversals, 1/min"),
+    Metric("heel_deg", "largest heel, deg"),
+    Metric("speed_lost_percent", "speed lost, %"),
+    Metric("overshoot_percent", "overshoot, %"),
+    Metric("settling_s", "settling, s"),
+    Metric("outside_corridor", "share of time outside corridor"),
+    Metric("success", "share of success"),
+    Metric("fuel", "fuel, straight run = 1"),
+)
 
-    Raises InputError if plotly is not installed or the page cannot be written; nothing
-    is written then.
 
-    Parameters
-    ----------
-    result : BenchmarkResult
-        Of `benchmark` or `load_results`.
-    path : str or Path
-        The HTML file; one that exists is replaced. It loads nothing.
-    controllers : optional
-        As `benchmark` was given them; needed to replay those given as objects.
-    worst : int
-        How many episodes of each controller in each task may be replayed; fewer if they
-        are too many.
-    workers : int or None
-        Processes that run them; None for one per core.
-    progress : callable, optional
-        Called with the stage of the work, what is done and the total.
+def write_page(result: BenchmarkResult, path: str | Path) -> None:
+    """Write the page of a benchmark, one HTML file that loads nothing.
+
+    `result`: of `benchmark` or `load_results`; a file that exists is replaced. Raises
+    InputError if plotly is not installed or the page cannot be written.
     """
     target = Path(path)
     check_page(target, plots=True)
-    count, episodes = replayable(result, worst)
-    again = rerun(result, episodes, controllers, workers, progress)
-    write_text(_page(result, again, count), target)
-
-
-def _page(result: BenchmarkResult, again: Rerun, count: int) -> str:
-    """Return the text of the page with so many episodes of each controller."""
     summary = result.summary
-    scores_caption = "Relative costs."
-    cost_tables = [costs_table(result)]
-    if summary["reference"]:
-        scores_caption = (
-            "Scores with their 95 % intervals: ● geometric mean, ◇ interquartile mean."
-            " Dotted: the tuned rule, 1, and the bound from clairvoyance."
-        )
-        cost_tables.append(gains_table(result))
-    profile = None
-    if summary["profile"]["shares"]:
-        profile_caption = (
-            "Share of all episodes that score more than the threshold, which is the"
-            " cost of the tuned rule in the same episode over that of the controller;"
-            " higher is better. Dotted: as cheap as the rule."
-        )
-        profile = _figure("profile-figure", profile_figure(result), profile_caption)
-    failures_title = (
-        f"{len(result.failures)} times a controller failed or could not run a task"
-    )
-    return render(
-        "agents.benchmarking/page.html",
-        suite=summary["suite"]["name"],
-        lead=_lead(result),
-        failures=result.failures,
-        failures_title=failures_title,
-        looks=looks(result.ranking),
-        ranking=ranking_table(result),
-        scores_figure=_figure("scores", scores_figure(result), scores_caption),
-        cost_tables=cost_tables,
-        improvement=improvement_table(result),
-        profile=profile,
-        tasks=[
-            _task(result, again, task, number)
-            for number, task in enumerate(result.tasks)
-        ],
-        replays=_about_replays(again, count),
-        not_replayed=_not_replayed(again),
-        replay_data=replay_data(result, again, count),
-        origin=_origin(result),
-        controllers=_files_and_hashes(result),
-        packed=packed,
-    )
-
-
-def packed(text: str) -> str:
-    """Return a text that the page's script unpacks: gzip in base64."""
-    return base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
-
-
-def _figure(name: str, figure: Figure, caption: str) -> PageFigure:
-    return PageFigure(name, caption, figure.layout.height, packed(figure.to_json()))
+    limits = {}
+    metrics = {}
+    for task, about in summary["suite"]["tasks"].items():
+        limits[task] = _limits_text(about["limits"])
+        cells = result.cells(task).values()
+        metrics[task] = [
+            metric
+            for metric in METRICS
+            if any(metric.name in cell["metrics"] for cell in cells)
+        ]
+    shown = {
+        **summary,
+        "lead": _lead(result),
+        "failures": result.failures,
+        "names": result.ranking,
+        "scores": scores_figure(result),
+        "limits": limits,
+        "metrics": metrics,
+        "command": command(result),
+        "seeds": f"{result.seeds[0]} to {result.seeds[-1]}",
+    }
+    write_text(render("agents.benchmarking/page.html", **shown), target)
 
 
 def _lead(result: BenchmarkResult) -> str:
     controllers = counted(len(result.ranking), "controller")
     tasks = counted(len(result.tasks), "task")
     episodes = counted(len(result.seeds), "episode")
-    return (
-        f"{controllers} in {tasks}, {episodes} each, the same for all. Tables sort by a"
-        " click on a head; figures may be zoomed."
+    return f"{controllers} in {tasks}, {episodes} each, the same for all."
+
+
+def _limits_text(limits: Mapping[str, float]) -> str:
+    """Sentence on the limits of a task; empty if it has none."""
+    parts = []
+    for name, limit in limits.items():
+        figure = LIMITED_FIGURES[name]
+        statistic = "mean" if figure.statistic == "mean" else "95th percentile"
+        parts.append(f"{figure.title} {number(limit)} ({statistic})")
+    return f"Limits: {'; '.join(parts)}." if parts else ""
+
+
+def scores_figure(result: BenchmarkResult) -> Figure:
+    """Return the scores in each task with their intervals, the first task on top."""
+    styles = line_styles(result.ranking)
+    tasks = list(result.tasks)
+    traces = []
+    for name in result.ranking:
+        scores = {}
+        for task in tasks:
+            cell = result.cells(task).get(name)
+            if cell and cell["score"]["low"] is not None:
+                scores[task] = cell["score"]
+        values = [score["value"] for score in scores.values()]
+        above = [score["high"] - score["value"] for score in scores.values()]
+        below = [score["value"] - score["low"] for score in scores.values()]
+        colour = styles[name]["colour"]
+        trace = graph_objects().Scatter(
+            x=values,
+            y=list(scores),
+            name=name,
+            mode="markers",
+            offsetgroup=name,
+            orientation="h",
+            marker={"color": colour, "size": 8},
+            error_x={"array": above, "arrayminus": below},
+        )
+        traces.append(trace)
+
+    rows = axis(categoryorder="array", categoryarray=tasks[::-1], automargin=True)
+    row_height = 18 + 12 * len(result.ranking)  # pixels
+    figure = panels(
+        [Panel(traces, axis("score", zero=True), rows)],
+        height=row_height * len(tasks) + 120,
+        hovermode="closest",
+        scattermode="group",
     )
-
-
-def _task(
-    result: BenchmarkResult, again: Rerun, task: str, number: int
-) -> dict[str, Any]:
-    """Return what the page shows of a task."""
-    about = result.summary["suite"]["tasks"][task]
-    costs = costs_figure(result, task)
-    costs_caption = (
-        "Cost of each episode, with the box of the middle half and the median."
-    )
-    return {
-        "name": task,
-        "about": f"{about['environment']}, {about['model']}: {about['why']}.",
-        "costs": _figure(f"costs-{number}", costs, costs_caption),
-        "metrics": metrics_table(result, task, f"metrics-{number}"),
-        "seed": hardest_seed(result, task),
-        "hardest": _hardest(result, again, task, number),
-    }
-
-
-def _hardest(
-    result: BenchmarkResult, again: Rerun, task: str, number: int
-) -> list[PageFigure]:
-    """Return the figures of the hardest episode; none if it cannot be replayed."""
-    seed = hardest_seed(result, task)
-    episodes: dict[str, Episode] = {}
-    for name in usable_controllers(result, task):
-        key = EpisodeId(name, task, 0, seed)
-        if key in again.episodes:
-            episodes[name] = again.episodes[key]
-    if not episodes:
-        return []
-
-    histories = histories_figure(episodes, result.ranking)
-    about = f"histories-{number}"
-    first, *_ = episodes.values()
-    if first.waypoints is None:
-        caption = "Heading, with the ordered course, and the rudder."
-        return [_figure(about, histories, caption)]
-
-    tracks = tracks_figure(episodes, result.ranking)
-    tracks_caption = (
-        "Paths over ground; dashed the path to follow, shaded its corridor."
-    )
-    caption = "Cross-track error, with the bounds of the corridor, and the rudder."
-    return [
-        _figure(f"tracks-{number}", tracks, tracks_caption),
-        _figure(about, histories, caption),
-    ]
-
-
-def _about_replays(again: Rerun, count: int) -> str:
-    """Return a paragraph about the episodes that may be replayed."""
-    episodes = "the worst episode" if count == 1 else f"the {count} worst episodes"
-    text = (
-        f"For each controller {episodes} of each task, together with the task's best"
-        " controller in the same one; and all controllers in the hardest one. They were"
-        " run again for this page from their seeds"
-    )
-    if not again.different:
-        return f"{text}; each cost the same as in the results."
-    first = " ".join(str(part) for part in again.different[0])
-    return (
-        f"{text}; {len(again.different)} of {len(again.episodes)} cost something else"
-        " than in the results, as on another processor or version: the first is"
-        f" {first}."
-    )
-
-
-def _not_replayed(again: Rerun) -> list[str]:
-    """Return why controllers cannot be replayed, each reason once."""
-    reasons = []
-    for (name, _), why in again.refused.items():
-        reason = f"{name}: {why}"
-        if reason not in reasons:
-            reasons.append(reason)
-    return reasons
-
-
-def _origin(result: BenchmarkResult) -> dict[str, Any]:
-    """Return how the results were made."""
-    summary = result.summary
-    seeds = result.seeds
-    return {
-        "command": command(result),
-        "suite": summary["suite"],
-        "seeds": f"{seeds[0]} to {seeds[-1]}",
-        "versions": summary["versions"],
-        "episodes": summary["episodes"],
-        "results": RESULTS,
-    }
-
-
-def _files_and_hashes(result: BenchmarkResult) -> list[tuple[str, str, str]]:
-    """Return rows of controller, file or design, and SHA-256."""
-    rows = []
-    for name, about in result.summary["controllers"].items():
-        for path, sha256 in about["files"].items():
-            rows.append((name, path, sha256))
-
-        for task in result.tasks:
-            cell = result.cells(task).get(name, {"policy_sha256": []})
-            for sha256 in cell["policy_sha256"]:
-                if sha256:
-                    rows.append((name, f"controller for {task}", sha256))
-    return rows
+    figure.add_vline(x=1.0, line={"color": MUTED, "width": 1.2, "dash": "dot"})
+    return figure
 
 
 def command(result: BenchmarkResult) -> str:

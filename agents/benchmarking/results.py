@@ -1,11 +1,10 @@
 """Results of a benchmark: a row for each episode, and the summary; both as files.
 
-`results.json` is described in `agents.benchmarking.results_format`, `episodes.parquet`
-has one row for each controller, task, training run and seed.
+docs/benchmark.md describes `results.json`; `episodes.parquet` has one row for each
+controller, task, training run and seed.
 """
 
 import platform
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -15,41 +14,44 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+import pandas as pd
 
-from agents.benchmarking.cells import CellName, Cells
-from agents.benchmarking.entries import Entry
-from agents.benchmarking.episode_table import (
-    Columns,
-    episode_table,
-    pyarrow,
-    read_episodes,
-    write_episodes,
-)
-from agents.benchmarking.results_format import (
-    FIELDS,
-    FORMAT,
-    KIND,
-    check_summary,
-)
-from agents.benchmarking.sources import file_hash
-from agents.benchmarking.summary import summarise
+from agents.benchmarking.cells import Cell, Cells
+from agents.benchmarking.entries import Entry, file_hash
+from agents.benchmarking.summary import KEYS, Summary
 from agents.controllers.interface import model_hash
 from agents.output import check_writable, present
-from agents.suites.suite import (
-    FIRST_SEED,
-    BenchmarkTask,
-    Suite,
-    list_suites,
-    load_suite,
-)
+from agents.suites.suite import FIRST_SEED, BenchmarkTask, Suite
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_fields, check_format
+from shipgym.drafts import atomic_path
 from shipgym.errors import InputError
-from shipgym.files import make_folder, read_json, write_json
+from shipgym.extras import library
+from shipgym.files import (
+    LARGEST_TENSORS,
+    make_folder,
+    read_bytes,
+    read_json,
+    write_json,
+)
 
 RESULTS, EPISODES, PARTS = "results.json", "episodes.parquet", "parts"
+FORMAT, KIND = 3, "shipgym-benchmark"
+FIELDS = (
+    "format",
+    "kind",
+    "versions",
+    "suite",
+    "seeds",
+    "controllers",
+    "rule",
+    "tasks",
+    "ranking",
+    "episodes",
+)
 PACKAGES = ("shipgym", "numpy", "numba", "scipy", "control")
 REMEDY = "run `shipgym benchmark` again"
+MOST_COLUMNS = 200  # of the table of episodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,19 +61,13 @@ class BenchmarkResult:
     Attributes
     ----------
     summary : dict
-        Content of `results.json` (`agents.benchmarking.results_format`).
-    episodes : dict of str to array
+        Content of `results.json`.
+    episodes : DataFrame
         One row for each episode: controller, task, run, seed, and figures by name.
-    suite : Suite or None
-        Suite that it was run on, if it is known.
-    entries : tuple of Entry
-        Controllers that were run; none if it was read from a file.
     """
 
     summary: dict[str, Any]
-    episodes: Columns
-    suite: Suite | None = None
-    entries: tuple[Entry, ...] = ()
+    episodes: pd.DataFrame
 
     @property
     def ranking(self) -> list[str]:
@@ -87,26 +83,12 @@ class BenchmarkResult:
     def seeds(self) -> range:
         """Seeds of the episodes of each task."""
         first = self.summary["seeds"]["first"]
-        count = self.summary["seeds"]["count"]
-        return range(first, first + count)
+        return range(first, first + self.summary["seeds"]["count"])
 
     def cells(self, task: str) -> dict[str, Any]:
         """Return the figures in a task of each controller that could run it."""
         cells: dict[str, Any] = self.summary["tasks"][task]
         return cells
-
-    def task(self, name: str) -> BenchmarkTask:
-        """Return a task to run again.
-
-        Raises InputError if its suite is not known.
-        """
-        if self.suite is None:
-            name = self.summary["suite"]["name"]
-            raise InputError(
-                f"suite: expected the one of the results, '{name}', got none;"
-                " load_results(path, suite=load_suite('your_suite.toml'))"
-            )
-        return self.suite.task(name)
 
     @property
     def failures(self) -> list[str]:
@@ -115,7 +97,6 @@ class BenchmarkResult:
         for name, about in self.summary["controllers"].items():
             for task, why in about["refused"].items():
                 failures.append(f"{name} could not run {task}: {why}")
-
             for task in self.tasks:
                 cell = self.cells(task).get(name)
                 if cell and cell["failed"]:
@@ -133,13 +114,11 @@ class BenchmarkResult:
         """
         check_choice(controller, self.summary["controllers"], "controller")
         check_choice(task, self.tasks, "task")
-        check_choice(name, self.episodes, "figure")
-
-        episodes = self.episodes
-        is_controller = episodes["controller"] == controller
-        is_task = episodes["task"] == task
-        figures = episodes[name][is_controller & is_task]
-        return np.reshape(figures, (-1, len(self.seeds)))
+        check_choice(name, list(self.episodes), "figure")
+        table = self.episodes
+        rows = (table["controller"] == controller) & (table["task"] == task)
+        figures: Floats = table.loc[rows, name].to_numpy(np.float64)
+        return figures.reshape(-1, len(self.seeds))
 
     def save(self, folder: str | Path) -> Self:
         """Write `episodes.parquet` and then `results.json`, each whole or not at all.
@@ -147,17 +126,22 @@ class BenchmarkResult:
         Returns the result with the hash of `episodes.parquet` in its summary. Raises
         InputError if pyarrow is missing or the folder cannot be written.
         """
-        pyarrow()
+        _pyarrow()
         target = Path(folder)
         make_folder(target)
         table = target / EPISODES
-        write_episodes(self.episodes, table)
+        with atomic_path(table) as draft:
+            self.episodes.to_parquet(draft, engine="pyarrow", index=False)
 
-        sha256 = file_hash(table)
-        about_table = {**self.summary["episodes"], "sha256": sha256}
+        about_table = {**self.summary["episodes"], "sha256": file_hash(table)}
         summary = {**self.summary, "episodes": about_table}
         write_json(summary, target / RESULTS)
         return replace(self, summary=summary)
+
+
+def _pyarrow() -> Any:
+    """Return pyarrow's module for Parquet; InputError says how it is installed."""
+    return library("pyarrow.parquet", "benchmark", "the table of episodes needs it")
 
 
 def check_new(folder: Path, resume: bool, suite: str) -> Path:
@@ -166,7 +150,7 @@ def check_new(folder: Path, resume: bool, suite: str) -> Path:
     One that holds results is for `resume`, if they are of this suite. Raises InputError
     saying what to do.
     """
-    pyarrow()  # a missing extra is reported now, not after the work
+    _pyarrow()  # a missing extra is reported now, not after the work
     if folder.exists() and not folder.is_dir():
         raise InputError(
             f"{folder}: expected a folder for the results, got a file; choose another"
@@ -199,48 +183,57 @@ def collect(
     tasks: Sequence[BenchmarkTask],
     entries: Sequence[Entry],
     cells: Cells,
-    n_episodes: int,
+    rule: str,
+    rule_cells: Mapping[str, Cell],
 ) -> BenchmarkResult:
     """Put together what was run.
 
-    `cells` has every entry in every task, by the names of both.
+    `cells` has every entry in every task, by the names of both; `rule_cells` the
+    controller `rule`, which scores are relative to, by the name of the task.
     """
-    names = [entry.name for entry in entries]
+    computed = Summary(tasks, [entry.name for entry in entries], cells, rule_cells)
+    episodes = computed.episodes
+    by_task = computed.by_task()
+    rule_costs = {}
+    for number, costs in computed.rule_costs.items():
+        rule_costs[tasks[number].name] = float(costs.mean())
     controllers = {}
-    in_order = {}
     for entry in entries:
         controllers[entry.name] = _about_entry(entry, tasks, cells)
-        for task in tasks:
-            key = entry.name, task.name
-            in_order[key] = cells[key]
-
-    seeds = FIRST_SEED + np.arange(n_episodes)
-    table = episode_table(in_order, seeds)
     summary = {
         "format": FORMAT,
         "kind": KIND,
         "versions": versions(),
         "suite": _about_suite(suite, tasks),
-        "seeds": {"first": FIRST_SEED, "count": n_episodes},
+        "seeds": {"first": FIRST_SEED, "count": episodes["seed"].nunique()},
         "controllers": controllers,
-        **summarise(tasks, names, cells),
-        "episodes": {
-            "file": EPISODES,
-            "rows": len(table["seed"]),
-            "sha256": None,
-        },
+        "rule": {"controller": rule, "costs": rule_costs},
+        "tasks": by_task,
+        "ranking": computed.ranking(by_task),
+        "episodes": {"file": EPISODES, "rows": len(episodes), "sha256": None},
     }
-    return BenchmarkResult(summary, table, suite, tuple(entries))
+    return BenchmarkResult(summary, episodes)
 
 
 def _about_suite(suite: Suite, tasks: Sequence[BenchmarkTask]) -> dict[str, Any]:
     source = Path(suite.source)
+    about_tasks = {}
+    for task in tasks:
+        about_tasks[task.name] = {
+            "environment": task.environment,
+            "model": task.model,
+            "model_sha256": model_hash(task.ship),
+            "why": task.why,
+            "limits": dict(task.limits),
+            "on": task.on,
+            "ship": task.true_ship,
+        }
     return {
         "name": suite.name,
         "sha256": suite.sha256,
         "file": source.name if source.suffix == ".toml" else "",
         "complete": len(tasks) == len(suite.tasks),
-        "tasks": {task.name: _about_task(task) for task in tasks},
+        "tasks": about_tasks,
     }
 
 
@@ -258,18 +251,6 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _about_task(task: BenchmarkTask) -> dict[str, Any]:
-    return {
-        "environment": task.environment,
-        "model": task.model,
-        "model_sha256": model_hash(task.ship),
-        "why": task.why,
-        "limits": dict(task.limits),
-        "on": task.on,
-        "ship": task.true_ship,
-    }
-
-
 def _about_entry(
     entry: Entry,
     tasks: Sequence[BenchmarkTask],
@@ -281,7 +262,7 @@ def _about_entry(
     for task in tasks:
         cell = cells[entry.name, task.name]
         files |= entry.fingerprint(task)
-        n_runs = max(n_runs, len(cell.runs))
+        n_runs = max(n_runs, len(cell.costs))
         if cell.refused:
             refused[task.name] = cell.refused
     return {
@@ -292,70 +273,69 @@ def _about_entry(
     }
 
 
-def load_results(path: str | Path, suite: Suite | None = None) -> BenchmarkResult:
-    """Read the results of a benchmark.
+def load_results(path: str | Path) -> BenchmarkResult:
+    """Read the results of a benchmark from their folder, or `results.json` in it.
 
     Raises InputError naming the file and the field at fault.
-
-    Parameters
-    ----------
-    path : str or Path
-        Their folder, or `results.json` in it.
-    suite : Suite, optional
-        Your own suite that they are of (`load_suite`), to run episodes again; a shipped
-        one is found by its name.
     """
     where = Path(path)
     if where.is_dir():
         where = where / RESULTS
-    summary = _read_summary(where)
-
-    about_suite = summary["suite"]
-    if suite is None and about_suite["name"] in list_suites():
-        suite = load_suite(about_suite["name"])
-    elif suite is not None and suite.sha256 != about_suite["sha256"]:
-        raise InputError(f"{where}: expected results of this suite, got of another")
-
-    table = where.with_name(EPISODES)
-    about_table = summary["episodes"]
-    if about_table["sha256"] != file_hash(table):
+    summary = read_json(where, "file of benchmark results", REMEDY)
+    if summary.get("kind") != KIND:
         raise InputError(
-            f"{table}: expected the file that {RESULTS} was written with, got another"
+            f"{where}: kind: expected '{KIND}', got {summary.get('kind')!r}"
+        )
+    check_format(summary, FORMAT, str(where))
+    check_fields(summary, FIELDS, str(where), REMEDY)
+    episodes = _read_episodes(where.with_name(EPISODES), summary["episodes"])
+    result = BenchmarkResult(dict(summary), episodes)
+    _check_rows(result, where)
+    return result
+
+
+def _read_episodes(path: Path, about: Mapping[str, Any]) -> pd.DataFrame:
+    """Read the table that was written with a summary, which tells its hash and size."""
+    content = read_bytes(path, "file of episodes", LARGEST_TENSORS)
+    if about["sha256"] != file_hash(path):
+        raise InputError(
+            f"{path}: expected the file that {RESULTS} was written with, got another"
             f" or one that is cut short; {REMEDY}"
         )
-    episodes = read_episodes(table, about_table["rows"])
-    _check_rows(summary, episodes, where)
-    return BenchmarkResult(summary, episodes, suite)
-
-
-def _read_summary(path: Path) -> dict[str, Any]:
-    summary = read_json(path, "file of benchmark results", REMEDY)
-    kind = summary.get("kind")
-    if kind != KIND:
-        raise InputError(f"{path}: kind: expected '{KIND}', got {kind!r}")
-    where = str(path)
-    check_format(summary, FORMAT, where)
-    check_fields(summary, FIELDS, where, REMEDY)
-    check_summary(summary, where)
-    return dict(summary)
-
-
-def _check_rows(summary: Mapping[str, Any], episodes: Columns, where: Path) -> None:
-    """Refuse a table whose rows are not those that the summary counts."""
-    runs: Counter[CellName] = Counter()
-    for task, cells in summary["tasks"].items():
-        for name, cell in cells.items():
-            runs[name, task] = cell["runs"]
-
-    names = episodes["controller"].tolist()
-    tasks = episodes["task"].tolist()
-    rows = Counter(zip(names, tasks, strict=True))
-    n_episodes = summary["seeds"]["count"]
-    for key in [*runs, *rows]:
-        if rows[key] != runs[key] * n_episodes:
-            name, task = key
-            raise InputError(
-                f"{where}: expected {runs[key]} runs of {n_episodes} episodes of"
-                f" '{name}' on '{task}' in {EPISODES}, got {rows[key]} episodes;"
-                f" {REMEDY}"
+    parquet = _pyarrow()
+    pyarrow = library("pyarrow", "benchmark", "the table of episodes needs it")
+    try:
+        file = parquet.ParquetFile(pyarrow.BufferReader(content))
+        size = file.metadata
+        is_small = size.num_columns <= MOST_COLUMNS
+        if size.num_rows != about["rows"] or not is_small:
+            raise ValueError(
+                f"{size.num_rows} rows of {size.num_columns} columns instead of"
+                f" {about['rows']} rows"
             )
+        table: pd.DataFrame = file.read().to_pandas(ignore_metadata=True)
+        numbers = table.columns.difference(["controller", "task"])
+        return table.astype(dict.fromkeys(numbers.difference(KEYS), np.float64))
+    except (OSError, pyarrow.ArrowException, ValueError, TypeError) as error:
+        raise InputError(
+            f"{path}: expected a table of episodes, got one that cannot be read"
+            f" ({error}); {REMEDY}"
+        ) from None
+
+
+def _check_rows(result: BenchmarkResult, where: Path) -> None:
+    """Refuse a summary that does not count the rows of its table."""
+    try:
+        rows = result.episodes.groupby(["controller", "task"]).size().to_dict()
+        counted = {}
+        for task in result.tasks:
+            for name, cell in result.cells(task).items():
+                counted[name, task] = cell["runs"] * len(result.seeds)
+        agree = rows == counted and set(result.ranking) >= {name for name, _ in rows}
+    except (KeyError, TypeError, AttributeError):
+        agree = False
+    if not agree:
+        raise InputError(
+            f"{where}: expected a summary of the episodes in {EPISODES}, got another;"
+            f" {REMEDY}"
+        )

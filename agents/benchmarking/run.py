@@ -19,6 +19,7 @@ from agents.suites.suite import (
     BenchmarkTask,
     Suite,
     load_suite,
+    suite_file,
 )
 from identification.progress import Progress
 from shipgym.checks import check_whole
@@ -104,14 +105,25 @@ def _run(
     where: JobEngine,
     progress: Progress | None,
 ) -> BenchmarkResult:
-    cells = _run_cells(entries, tasks, n_episodes, where, progress)
-    if not any(cell.runs for cell in cells.values()):
-        (entry, task), cell = next(iter(cells.items()))
+    rule = rule_of(suite)
+    others = {entry.source: entry for entry in entries if entry.is_text}
+    rule_entry = others.get(rule, Entry("", rule))  # no other entry has no name
+    everyone = dict.fromkeys([*entries, rule_entry])
+    cells = _run_cells(list(everyone), tasks, n_episodes, where, progress)
+    own = [cells[entry.name, task.name] for entry in entries for task in tasks]
+    if all(cell.refused for cell in own):
         raise NoResultsError(
-            f"controllers: no controller could run any task; '{entry}' in '{task}':"
-            f" {cell.refused}"
+            f"controllers: no controller could run any task; '{entries[0].name}' in"
+            f" '{tasks[0].name}': {own[0].refused}"
         )
-    return collect(suite, tasks, entries, cells, n_episodes)
+    rule_cells = {task.name: cells[rule_entry.name, task.name] for task in tasks}
+    return collect(suite, tasks, entries, cells, rule, rule_cells)
+
+
+def rule_of(suite: Suite) -> str:
+    """Controller whose cost scores are relative to: tuned, where the suite has that."""
+    has_settings = suite_file(suite.source, "tuned").exists()
+    return "tuned-preview-lq" if has_settings else "preview-lq"
 
 
 def _run_cells(

@@ -18,14 +18,13 @@ from agents.cli.command import (
 
 if TYPE_CHECKING:
     from agents.benchmarking.results import BenchmarkResult
-    from identification.progress import Progress
 
 Controllers = Annotated[
     str | None,
     Option(
         help=(
             "What is compared, separated by commas: classical controllers (pid, lq,"
-            " mpc, ...), tuned-pid, pretrained agents (ppo, sac), files of agents,"
+            " mpc, ...), tuned-pid, shipped agents (ppo), files of agents,"
             " module:function, name=...; default: all classical ones."
         )
     ),
@@ -46,12 +45,7 @@ Resume = Annotated[
 ]
 Page = Annotated[
     bool,
-    Option(
-        "--page/--no-page",
-        help=(
-            "Write index.html, with the worst episodes to replay; later with --resume."
-        ),
-    ),
+    Option("--page/--no-page", help="Write index.html; later with --resume."),
 ]
 
 
@@ -96,7 +90,7 @@ def benchmark_command(
                 episodes=episodes,
                 allow_code=allow_code or (),
             )
-            _write_page(result, out, page, workers, progress)
+        _write_page(result, out, page)
     except KeyboardInterrupt:
         fail(
             f"interrupted; what was done is kept in {out}: continue with --resume",
@@ -105,13 +99,7 @@ def benchmark_command(
     _print_result(result, out)
 
 
-def _write_page(
-    result: BenchmarkResult,
-    out: Path,
-    page: bool,
-    workers: int | None,
-    progress: Progress | None,
-) -> None:
+def _write_page(result: BenchmarkResult, out: Path, page: bool) -> None:
     """Write the page, or remove that of other results in the folder."""
     path = out / "index.html"
     path.unlink(missing_ok=True)
@@ -123,7 +111,7 @@ def _write_page(
     from shipgym.errors import InputError
 
     try:
-        write_page(result, path, workers=workers, progress=progress)
+        write_page(result, path)
     except InputError as error:  # the results are there even without plotly
         warn(f"there is no {path.name}: {error}")
 

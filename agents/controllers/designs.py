@@ -11,8 +11,7 @@ from agents.controllers.controller import Controller
 from agents.controllers.interface import model_hash
 from agents.controllers.registry import CLASSICAL as CLASSICAL
 from agents.controllers.registry import controller_class
-from agents.suites.reference import load_tuned
-from agents.suites.suite import BenchmarkTask
+from agents.suites.suite import BenchmarkTask, load_tuned
 from shipgym import InputError, ShipModel
 from shipgym.checks import quoted
 from shipgym.tasks.task import Task

@@ -30,7 +30,7 @@ from shipgym.checks import (
     data_only,
     placed,
 )
-from shipgym.files import parse_toml, read_bytes
+from shipgym.files import parse_toml, read_bytes, read_json
 
 __all__ = [
     "DEFAULT_SUITE",
@@ -42,6 +42,7 @@ __all__ = [
     "find_task",
     "list_suites",
     "load_suite",
+    "load_tuned",
     "parse_suite",
     "suite_file",
 ]
@@ -175,6 +176,23 @@ def suite_file(suite: str, what: str) -> Path:
         path = Path(suite)
         return path.with_name(f"{path.stem}-{what}.json")
     return FOLDER / f"{suite}-{what}.json"
+
+
+def load_tuned(suite: str) -> dict[str, dict[str, Any]]:
+    """Return the settings of classical controllers found by direct search.
+
+    By task and controller, as scripts/tune_controllers.py keeps them beside a suite:
+    `settings`, `cost`, `start_cost`, `evaluations`. `suite`: a `Suite.source`. Raises
+    InputError if the suite has none, or the file is broken.
+    """
+    path = suite_file(suite, "tuned")
+    remedy = "make it again with scripts/tune_controllers.py"
+    content = read_json(path, "file of tuned settings", remedy)
+    tasks = check_table(content.get("tasks"), f"{path}: tasks")
+    settings = {}
+    for name, controllers in tasks.items():
+        settings[name] = dict(check_table(controllers, f"{path}: tasks.{name}"))
+    return settings
 
 
 def parse_suite(

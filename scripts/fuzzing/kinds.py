@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import json
+from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -160,16 +161,13 @@ def cell_job() -> str:
 def keep_cell(folder: Path) -> None:
     """What a benchmark that goes on finds."""
     figures = {
-        "cost": np.array([1.0, 2.0, 3.0]),
-        "success": np.array([1.0, 0.0, np.nan]),
+        "cost": np.array([[1.0, 2.0, 3.0]] * 2),
+        "success": np.array([[1.0, 0.0, np.nan]] * 2),
+        "terminated": np.zeros((2, 3)),
+        "failed": np.zeros((2, 3)),
     }
-    run = {
-        "figures": figures,
-        "failure": "",
-        "seconds_per_action": 1e-6,
-        "policy_sha256": None,
-    }
-    result = result_to_json({"refused": "", "runs": [run, run]})
+    cell = Cell(figures=figures, seconds_per_action=1e-6)
+    result = result_to_json(asdict(cell))
     KeptResults(folder, run_job).save(cell_job(), result)
 
 
@@ -180,7 +178,7 @@ def read_cell(path: Path) -> Any:
         return None
     cell = Cell.from_dict(result_from_json(kept), EPISODES, "cell")
     cells = {(ENTRY.name, TASK.name): cell}
-    return collect(SUITE, [TASK], [ENTRY], cells, EPISODES)
+    return collect(SUITE, [TASK], [ENTRY], cells, "pid", {TASK.name: cell})
 
 
 def read_zip(path: Path) -> Any:

@@ -10,8 +10,7 @@ import pytest
 
 from agents import PID
 from agents.controllers.designs import CLASSICAL, design, design_base, tuned
-from agents.suites.reference import load_tuned
-from agents.suites.suite import BenchmarkTask, load_suite
+from agents.suites.suite import BenchmarkTask, load_suite, load_tuned
 from agents.training.controller_search import (
     SearchBudget,
     episodes_of,
@@ -129,7 +128,7 @@ def test_settings_found_are_read_from_the_file_of_the_suite(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "tuned.json"
-    monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: path)
+    monkeypatch.setattr("agents.suites.suite.suite_file", lambda suite, what: path)
     found = {
         "pid": {"settings": {"damping": 1.0}, "cost": 2.0},
         "lq": {"settings": {}, "cost": 3.0},
@@ -151,7 +150,7 @@ def test_policies_are_not_added_to_slow_controllers_unless_asked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "tuned.json"
-    monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: path)
+    monkeypatch.setattr("agents.suites.suite.suite_file", lambda suite, what: path)
     costs = {"mpc": 1.0, "lq": 3.0, "pid": 4.0}
     found = {kind: {"settings": {}, "cost": cost} for kind, cost in costs.items()}
     write_json({"tasks": {"calm": found}}, path)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from agents import load_agent
-from agents.benchmarking.sources import pretrained
+from agents.agent_file import PRETRAINED
 from agents.controllers.interface import check_fits, model_hash
 from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import load_suite
@@ -17,7 +17,7 @@ ROUNDING = 1e-4  # of a cost over an episode, on other processors
 
 @pytest.mark.parametrize("task", TASKS, ids=lambda task: task.name)
 def test_each_task_has_an_agent_of_every_training_seed(task):
-    paths = pretrained(task.name, "ppo")
+    paths = sorted(PRETRAINED.glob(f"{task.name}-ppo-*.json"))
     names = [f"{task.name}-ppo-s{seed}" for seed in range(SEEDS)]
     assert [path.stem for path in paths] == names
     for seed, agent in enumerate(map(load_agent, paths)):
@@ -43,7 +43,7 @@ def test_each_task_has_an_agent_of_every_training_seed(task):
 
 @pytest.mark.parametrize("task", TASKS[:2], ids=lambda task: task.name)
 def test_an_agent_costs_what_its_record_says(task):
-    agent = load_agent(pretrained(task.name, "ppo")[0])
+    agent = load_agent(sorted(PRETRAINED.glob(f"{task.name}-ppo-*.json"))[0])
     first, last = agent.training["evaluation_seeds"]
     seeds = np.arange(first, last + 1)
     costs = episode_costs(agent, task.engine(len(seeds)), seeds)

@@ -9,21 +9,14 @@ import numpy as np
 import pytest
 
 import shipgym
-from agents import benchmark
 from agents.suites.environments import read_environment
 from agents.suites.limits import exceeded
-from agents.suites.reference import (
-    RULE,
-    best_costs,
-    best_known,
-    load_tuned,
-    reference_costs,
-)
 from agents.suites.suite import (
     BenchmarkTask,
     find_task,
     list_suites,
     load_suite,
+    load_tuned,
     parse_suite,
     suite_file,
 )
@@ -133,8 +126,7 @@ def test_shipped_suites_are_known_by_name():
     assert (SHIPPED.name, SHIPPED.source) == ("shipgym-v1", "shipgym-v1")
     assert load_suite("shipgym-v1") is SHIPPED
     assert len(SHIPPED.sha256) == 64
-    for what in ("best", "tuned"):
-        assert suite_file("shipgym-v1", what).is_file()
+    assert suite_file("shipgym-v1", "tuned").is_file()
     said = "suite: expected one of .* a TOML file, got 'shipgym-v2'.*'shipgym-v1'"
     with pytest.raises(InputError, match=said):
         load_suite("shipgym-v2")
@@ -311,58 +303,9 @@ def test_an_id_without_the_path_of_its_task_is_refused(registry):
 # --- what is kept beside a suite
 
 
-def test_a_suite_without_best_known_costs_has_no_references(tmp_path):
-    suite = load_suite(write_suite(tmp_path))
-    assert (best_known(suite.source), reference_costs(suite.source)) == ({}, {})
-    with pytest.raises(InputError, match=r"no best known costs are kept for .*'calm'"):
-        best_costs(suite.task("calm"))
-    with pytest.raises(InputError, match="there is no such file of tuned settings"):
-        load_tuned(suite.source)
-
-
-def test_references_are_the_costs_of_the_rule_and_the_bound(tmp_path):
-    bound = {"costs": [1.0, 3.0] * 50, "by": ["lq"] * 100}
-    best = {"calm": bound | {"rule_costs": [2, 4] * 50}, "turns": bound}
-    suite = load_suite(write_suite(tmp_path, best=best))
-    references = reference_costs(suite.source)
-    assert list(references) == ["calm"]  # nobody has run the rule in the other
-    assert [costs[:2].tolist() for costs in references["calm"]] == [[2, 4], [1, 3]]
-    assert best_costs(suite.task("calm"))[:3].tolist() == [1.0, 3.0, 1.0]
-
-
-def test_no_cost_of_the_rule_is_below_the_bound():
-    references = reference_costs("shipgym-v1")
-    assert list(references) == [task.name for task in SHIPPED.tasks]
-    for rule, bound in references.values():
-        assert (bound <= rule * (1.0 + 1e-9)).all()
-
-
-def test_the_rule_that_scores_are_relative_to_is_the_tuned_one():
-    """Where it was tuned again: `python scripts/best_known.py results`."""
-    result = benchmark(RULE, tasks="sharp-turns", episodes=2)
-    for cells in result.summary["tasks"].values():
-        assert cells[RULE]["score"]["value"] == pytest.approx(1.0, rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"rule_costs": "30"}, r"best.json: calm.rule_costs: expected .* got '30'"),
-        ({"rule_costs": [None] * 100}, r"calm.rule_costs\[0\]: expected .* got None"),
-        ({"rule_costs": [1] * 99}, r"calm.rule_costs: expected .* got 99"),
-        ({"costs": ["1"] * 100}, r"best.json.*calm.costs\[0\]: expected .* got '1'"),
-        ({"costs": [1.0] * 99}, "best.json: calm: expected costs of 100 episodes"),
-        ({"by": ["lq"] * 101}, "best.json: calm: .* got 100 and 101"),
-    ],
-)
-def test_best_known_costs_with_a_wrong_field_are_refused(tmp_path, changes, said):
-    known = {"rule_costs": [30.0] * 100, "costs": [1.0] * 100, "by": ["lq"] * 100}
-    path = write_suite(tmp_path, best={"calm": known | changes})
-    with pytest.raises(InputError, match=said):
-        best_known(str(path))
-
-
 def test_tuned_settings_are_tables_by_task(tmp_path):
+    with pytest.raises(InputError, match="there is no such file of tuned settings"):
+        load_tuned(str(write_suite(tmp_path)))
     for content, said in (
         ({"tasks": 3}, "tuned.json: tasks: expected .* got 3"),
         ({"tasks": {"calm": 3}}, "tasks.calm: expected .* got 3"),

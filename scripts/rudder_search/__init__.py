@@ -1,1 +1,0 @@
-"""Search of rudder commands on the true ship, the weather to come known."""
