@@ -30,8 +30,6 @@ METRICS = (
     Metric("rudder_reversals_min", "rudder reversals, 1/min"),
     Metric("heel_deg", "largest heel, deg"),
     Metric("speed_lost_percent", "speed lost, %"),
-    Metric("overshoot_percent", "overshoot, %"),
-    Metric("settling_s", "settling, s"),
     Metric("outside_corridor", "share of time outside corridor"),
     Metric("success", "share of success"),
     Metric("fuel", "fuel, straight run = 1"),

@@ -1,7 +1,7 @@
 """Figures of rollouts, one number an episode.
 
 Intervals in which an episode was over do not count. A figure that an episode does not
-have (nothing sailed, no course change, no path) is NaN.
+have (nothing sailed, no path) is NaN.
 
 Sources: Norrbin 1972, On the added resistance due to steering on a straight course
 (steering cost); van Amerongen 1982, Adaptive steering of ships (way lengthened and
@@ -9,7 +9,6 @@ speed lost by steering); Carlton 2012, Marine Propellers and Propulsion, chapter
 (propeller law: power is proportional to the cube of the shaft speed).
 """
 
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -21,19 +20,9 @@ from agents.suites.suite import BenchmarkTask
 from shipgym import ShipModel
 from shipgym.arrays import Flags, Floats
 from shipgym.python_files import asked
-from shipgym.tasks.guidance import wrapped
 from shipgym.tasks.task import Task
 
 DEAD_BAND = np.radians(0.5)  # the rudder has turned round once it came back by so much
-SETTLED_SHARE, SETTLED_LEAST = 0.05, np.radians(1.0)  # of the change of course, and rad
-
-
-class CourseChange(NamedTuple):
-    """Figures of a change of course, or means over those of an episode."""
-
-    overshoot_percent: float  # of the first error
-    settling_s: float
-    unsettled: float  # 1 if it has not settled, else 0
 
 
 def recorded_for_metrics(task: Task) -> tuple[str, ...]:
@@ -81,7 +70,7 @@ def metrics(run: Rollout) -> dict[str, Floats]:
     """
     nowhere = np.full(len(run.seeds), np.nan)
     of_paths = ("cross_track_rmse_m", "outside_corridor", "left_corridor", "grounded")
-    undefined = dict.fromkeys((*CourseChange._fields, *of_paths), nowhere)
+    undefined = dict.fromkeys(of_paths, nowhere)
     own = task_figures(run)
     succeeded = own["success"] > 0.0
     lost = run.terminated & ~succeeded
@@ -108,7 +97,7 @@ def task_figures(run: Rollout) -> dict[str, Floats]:
         return {"success": _ever(run, "success")}
     if _keeps_course(run.task):
         kept = ~(run.terminated | run.failed)
-        return {**course_changes(run), "success": kept.astype(np.float64)}
+        return {"success": kept.astype(np.float64)}
 
     # a task of a user's own, which charges ships that are lost
     end_cost = total(during(run, "reward_end"))
@@ -184,80 +173,6 @@ def reversals(angle: Floats, counts: Flags, dead_band: float = DEAD_BAND) -> Flo
         lowest[turns] = now[turns]
         highest[turns] = now[turns]
     return number
-
-
-def course_changes(run: Rollout) -> dict[str, Floats]:
-    """Overshoot and settling after course changes, means over those of an episode.
-
-    A change begins with a new set-point at least 5 degrees from the heading, and lasts
-    until the next or the end of the episode. Its overshoot is the largest heading error
-    on the other side, in percent of the first error; it has settled at the time from
-    which on the error stays within 5 % of the first one, but no less than 1 degree. One
-    that has not counts as unsettled, with the whole of its duration as the time.
-    Returns the fields of `CourseChange`, each of shape (n,).
-    """
-    courses = run.states["set_point"].T
-    headings = run.states["psi"].T
-    undefined = np.full(len(CourseChange._fields), np.nan)
-    means = []
-    for course, heading, steps in zip(courses, headings, run.steps, strict=True):
-        sailed = slice(int(steps) + 1)
-        changes = changes_of_course(course[sailed], heading[sailed], run.dt)
-        if changes:
-            means.append(np.mean(changes, axis=0))
-        else:
-            means.append(undefined)
-
-    columns = np.transpose(means)
-    return dict(zip(CourseChange._fields, columns, strict=True))
-
-
-def changes_of_course(course: Floats, heading: Floats, dt: float) -> list[CourseChange]:
-    """Changes of a course to steer that are large enough to count.
-
-    `course`, `heading`: rad, shape (n_samples,); `dt`: between the samples, s.
-    """
-    error = wrapped(course - heading)
-    last = len(course) - 1
-    altered = 1 + np.flatnonzero(np.diff(course[:last]))
-    limits = [0, *altered.tolist(), last]
-
-    changes = []
-    smallest_change = np.radians(5.0)  # of course, whose overshoot and settling count
-    for begin, end in pairwise(limits):
-        change = abs(error[begin])
-        if change < smallest_change or begin == end:
-            continue
-        # the error at the end may already be that against the next course
-        after = end + 1
-        if course[end] != course[begin]:
-            after = end
-        figures = step_figures(error[begin:after], dt)
-        changes.append(figures)
-    return changes
-
-
-def step_figures(error: Floats, dt: float) -> CourseChange:
-    """Figures of one change of course.
-
-    `error`: heading error from the change on, rad, shape (n_samples,); `dt`: between
-    the samples, s.
-    """
-    change = abs(float(error[0]))
-    beyond = -np.sign(error[0]) * error  # on the other side
-    farthest = float(beyond.max())
-    overshoot = max(0.0, farthest)
-
-    band = max(SETTLED_SHARE * change, SETTLED_LEAST)
-    outside = np.flatnonzero(np.abs(error) > band)
-    last_outside = int(outside[-1])
-    last = len(error) - 1
-    settled = min(last_outside + 1, last)
-    return CourseChange(
-        overshoot_percent=100.0 * overshoot / change,
-        settling_s=settled * dt,
-        unsettled=float(last_outside == last),
-    )
 
 
 def fuel_per_distance(run: Rollout) -> Floats:
