@@ -62,7 +62,12 @@ def sea_sentences(provenance: Mapping[str, Any]) -> list[str]:
     if "currents" in provenance:
         sentences += _current_sentences(provenance["currents"])
     if "wind" in provenance:
-        sentences += _wind_sentences(provenance["wind"])
+        speeds = provenance["wind"]["mean_speeds"].values()
+        low = min(speeds)
+        high = max(speeds)
+        sentences.append(
+            f"wind of {low:.2g} to {high:.2g} m/s on average: its forces are removed"
+        )
     return sentences
 
 
@@ -78,30 +83,6 @@ def _current_sentences(currents: Mapping[str, Any]) -> list[str]:
     for text, names in trials_of.items():
         trials = ", ".join(names)
         sentences.append(f"{trials}: {text}")
-    return sentences
-
-
-def _wind_sentences(wind: Mapping[str, Any]) -> list[str]:
-    sentences = []
-    if "mean_speeds" in wind:
-        speeds = wind["mean_speeds"].values()
-        low = min(speeds)
-        high = max(speeds)
-        sentences.append(
-            f"wind of {low:.2g} to {high:.2g} m/s on average: its forces are removed"
-        )
-
-    units = {"wind_vdot": "m/s²", "wind_rdot": "rad/s²"}
-    accelerations = wind.get("accelerations", {})
-    for trial, row in accelerations.items():
-        parts = []
-        for channel, value in row.items():
-            motion = channel.removeprefix("wind_")
-            unit = units[channel]
-            parts.append(f"{motion} {value:.2g} {unit}")
-        name = PurePath(trial).name
-        removed = ", ".join(parts)
-        sentences.append(f"{name}: constant acceleration removed, {removed}")
     return sentences
 
 

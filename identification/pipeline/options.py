@@ -67,16 +67,14 @@ class Options:
         Where the covariance of the coefficients comes from.
     current : str or table
         Steady current in velocities over ground. "auto": estimated, one for all trials
-        unless they contradict each other, and removed if it differs from zero;
-        "shared": one for all trials, removed; "trial": one for each trial, removed;
-        "none": left in the velocities; or a known one as a table of m/s, such as
+        unless they contradict each other, and removed if it differs from zero; "none":
+        left in the velocities; or a known one as a table of m/s, such as
         `{ north = 0.2, east = -0.1 }`. Columns current_north and current_east take
         precedence.
     wind : str or table
         Force of the wind in columns wind_speed and wind_from. "auto": by Blendermann's
-        coefficients, where wind was logged; "none": not removed; "constant": a constant
-        sway and yaw acceleration is fitted to each trial; or by a name of coefficients
-        in `shipgym.sea`, or a table such as
+        coefficients, where wind was logged; "none": not removed; or by a name of
+        coefficients in `shipgym.sea`, or a table such as
         `{ coefficients = "blendermann-ferry", relative = true }`; relative means the
         wind felt on board, measured from the bow.
     rudder_bias : {"auto", "none"}

@@ -48,21 +48,9 @@ def pose(trials: Sequence[Trial], options: Options) -> Problem:
     ship = _checked_ship(particulars, used, table)
     shaft = _shaft_speed(options.service_shaft_speed, used, table)
     sampling = _sampling(options)
-    regression = {
-        "structure": table,
-        "particulars": ship,
-        "shaft_speed": shaft,
-        **sampling,
-    }
-    samples = build_samples(used, **regression)
-    if options.wind == "constant":
-        from identification.samples.wind import constant_wind, with_constant_wind
-
-        constants = constant_wind(used, samples, options.structure)
-        used = [with_constant_wind(trial, constants) for trial in used]
-        everything = [with_constant_wind(trial, constants) for trial in everything]
-        samples = build_samples(used, **regression)
-        sea["wind"] = {"option": "constant", "accelerations": constants}
+    samples = build_samples(
+        used, structure=table, particulars=ship, shaft_speed=shaft, **sampling
+    )
     check_samples(samples, used, table)
 
     return Problem(

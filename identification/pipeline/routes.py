@@ -74,9 +74,7 @@ def by_selection(trials: Sequence[Trial], options: Options) -> IdentificationRes
         current=options.current,
         wind=options.wind,
     )
-    calm = replace(options, current="none", hold_out=())
-    if options.wind != "constant":
-        calm = replace(calm, wind="none")
+    calm = replace(options, current="none", wind="none", hold_out=())
     choice = select(fitted, marked, calm)
     asked = replace(
         choice.options,

@@ -18,7 +18,7 @@ from shipgym.checks import (
 
 def check_current(option: Any) -> None:
     """Refuse a current that is neither a word nor a table of north and east, m/s."""
-    currents = ("auto", "shared", "trial", "none")
+    currents = ("auto", "none")
     if not isinstance(option, Mapping):
         check_choice(option, currents, "current", " or a table of north and east")
         return
@@ -50,7 +50,7 @@ def in_still_water(
     """
     check_current(current)
     check_wind(wind)
-    is_usual_wind = isinstance(wind, str) and wind in ("auto", "none", "constant")
+    is_usual_wind = isinstance(wind, str) and wind in ("auto", "none")
     feels_sea = any(_feels_sea(trial) for trial in trials)
     in_still = is_usual_wind and not feels_sea
     if particulars is None or in_still:
@@ -140,7 +140,7 @@ def _with_wind(
     remarks: list[str],
 ) -> dict[str, Trial]:
     """The trials by name, with the accelerations by their wind."""
-    if option in ("none", "constant"):
+    if option == "none":
         return dict(trials)
 
     from identification.samples.wind import measured_wind
@@ -159,7 +159,6 @@ def _with_wind(
     if option != "auto" and not is_logged:
         raise InputError(
             f"wind: expected columns wind_speed and wind_from besides psi, u and v for"
-            f" {option!r}, got no trial with them; name them in [columns], or take wind"
-            ' = "constant"'
+            f" {option!r}, got no trial with them; name them in [columns]"
         )
     return found

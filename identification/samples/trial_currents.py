@@ -62,60 +62,42 @@ def without_current(
     option: Any,
     remarks: list[str],
 ) -> dict[str, Any]:
-    """Take the current out of trials, by name, where it is known or asked for.
+    """Take the current out of trials, by name, where it is known or surely not zero.
 
     Returns a report on each; `remarks` get those that were doubtful.
     """
     trials = list(found.values())
     one_heading = _keep_to_one_heading(trials)
-    currents = currents_of(
-        trials,
-        length=length,
-        speed=speed,
-        option=option,
-    )
+    currents = currents_of(trials, length=length, speed=speed, option=option)
     rows: dict[str, Any] = {}
     doubtful: dict[str, list[str]] = {}
     for name, current in currents.items():
         doubt = _doubt(current, speed, one_heading)
+        if doubt and current.covariance is None:
+            raise InputError(
+                f"trial {name!r}: no current can be removed: {doubt}; give it in m/s,"
+                " towards north and east"
+            )
         if doubt:
-            if option != "auto" or current.covariance is None:
-                _refuse(name, doubt, current)
-            doubtful.setdefault(doubt, []).append(name)
-
-        is_chance = option == "auto" and current.probability > SIGNIFICANT
-        taken_out = not doubt and not is_chance
+            doubtful.setdefault(doubt, []).append(PurePath(name).name)
+        taken_out = not doubt and current.probability <= SIGNIFICANT
         if taken_out:
             found[name] = through_water(found[name], *current.velocity)
         rows[name] = _row(current, taken_out, one_heading)
-    remarks += _remarks(doubtful)
-    remarks += _remark_magnetic(trials)
-    return rows
-
-
-def _remark_magnetic(trials: Iterable[Trial]) -> list[str]:
-    """A remark on trials over ground whose heading counts from magnetic north."""
-    names = []
-    for trial in trials:
-        if trial.over_ground and trial.magnetic:
-            names.append(PurePath(trial.name).name)
-    if not names:
-        return []
-    return [
-        f"{', '.join(names)}: no current is looked for, as the heading is magnetic and"
-        " the variation would look like drift; write variation_deg (east positive) in"
-        " [sensors]"
-    ]
-
-
-def _remarks(doubtful: dict[str, list[str]]) -> list[str]:
-    """A sentence for each doubt, with the trials that it concerns."""
-    remarks = []
     for doubt, names in doubtful.items():
-        trials = ", ".join(PurePath(name).name for name in names)
-        remark = f"{trials}: no current is removed: {doubt}; {REMEDY}"
-        remarks.append(remark)
-    return remarks
+        remarks.append(f"{', '.join(names)}: no current is removed: {doubt}; {REMEDY}")
+    magnetic = [
+        PurePath(trial.name).name
+        for trial in trials
+        if trial.over_ground and trial.magnetic
+    ]
+    if magnetic:
+        remarks.append(
+            f"{', '.join(magnetic)}: no current is looked for, as the heading is"
+            " magnetic and the variation would look like drift; write variation_deg"
+            " (east positive) in [sensors]"
+        )
+    return rows
 
 
 def _row(current: TrialCurrent, taken_out: bool, one_heading: bool) -> dict[str, Any]:
@@ -132,13 +114,6 @@ def _row(current: TrialCurrent, taken_out: bool, one_heading: bool) -> dict[str,
         row["standard_errors"] = errors.tolist()
         row["probability"] = current.probability
     return row
-
-
-def _refuse(name: str, doubt: str, current: TrialCurrent) -> None:
-    remedy = REMEDY
-    if current.covariance is None:
-        remedy = "give it in m/s, towards north and east"
-    raise InputError(f"trial {name!r}: no current can be removed: {doubt}; {remedy}")
 
 
 def _doubt(current: TrialCurrent, speed: float, one_heading: bool) -> str:
@@ -182,9 +157,9 @@ def currents_of(
 ) -> dict[str, TrialCurrent]:
     """Currents by trial, of those whose current is known or can be estimated.
 
-    The trials to fit have one current unless they contradict it or are asked one by
-    one. That of a trial held out is theirs, or is found by their coefficients. A
-    current is estimated from trials of at least five ship lengths.
+    The trials to fit have one current unless they contradict it. That of a trial held
+    out is theirs, or is found by their coefficients. A current is estimated from trials
+    of at least five ship lengths.
 
     Parameters
     ----------
@@ -199,23 +174,15 @@ def currents_of(
     unknown = []
     shortest = 5.0 * length / speed
     for trial in trials:
-        known = _known_current(trial, option)
-        if known is not None:
-            source = "columns" if CURRENT_COLUMNS[0] in trial else "given"
-            found[trial.name] = TrialCurrent(
-                velocity=known,
-                covariance=None,
-                source=source,
-            )
+        if trial.channels.keys() >= set(CURRENT_COLUMNS):
+            columns = np.array([trial[name] for name in CURRENT_COLUMNS])
+            found[trial.name] = TrialCurrent(columns, None, "columns")
+        elif isinstance(option, Mapping) and trial.over_ground:
+            given = np.array([option["north"], option["east"]], dtype=float)
+            found[trial.name] = TrialCurrent(given, None, "given")
         elif _shows_current(trial) and trial.duration > shortest:
             unknown.append(trial)
-    estimated = _estimated_currents(
-        unknown,
-        length=length,
-        speed=speed,
-        option=option,
-    )
-    return found | estimated
+    return found | _estimated_currents(unknown, length, speed)
 
 
 def _shows_current(trial: Trial) -> bool:
@@ -225,28 +192,15 @@ def _shows_current(trial: Trial) -> bool:
 
 
 def _estimated_currents(
-    trials: Sequence[Trial],
-    length: float,
-    speed: float,
-    option: Any,
+    trials: Sequence[Trial], length: float, speed: float
 ) -> dict[str, TrialCurrent]:
     fitted = [trial for trial in trials if trial.use == "fit"]
     if not fitted:
         return {}
-    shared = option != "trial"
-    estimate = estimate_current(
-        fitted,
-        length=length,
-        speed=speed,
-        shared=shared,
-    )
-    if option == "auto" and len(fitted) > 1:
-        each = estimate_current(
-            fitted,
-            length=length,
-            speed=speed,
-            shared=False,
-        )
+    estimate = estimate_current(fitted, length=length, speed=speed, shared=True)
+    shared = True
+    if len(fitted) > 1:
+        each = estimate_current(fitted, length=length, speed=speed, shared=False)
         if _contradict(each.mean, each.covariance):
             estimate, shared = each, False
 
@@ -288,38 +242,6 @@ def _contradict(currents: Floats, covariance: Floats, chance: float = 1e-6) -> b
     of_differences = apart @ covariance @ apart.T
     probability = wald_probability(differences, of_differences)
     return probability < chance
-
-
-def _known_current(trial: Trial, option: Any) -> Floats | None:
-    """North and east of a current in columns or given; None where unknown.
-
-    Shape (2,) or (2, n_samples).
-    """
-    given = None
-    if isinstance(option, Mapping):
-        given = np.array([option["north"], option["east"]], dtype=float)
-    if not trial.channels.keys() >= set(CURRENT_COLUMNS):
-        return given if trial.over_ground else None
-
-    columns = np.array([trial[name] for name in CURRENT_COLUMNS])
-    if given is not None:
-        _check_agreement(trial, columns.mean(axis=1), given)
-    return columns
-
-
-def _check_agreement(
-    trial: Trial, means: Floats, given: Floats, contradiction: float = 0.1
-) -> None:
-    """Refuse a given current that is not that of the columns, m/s."""
-    difference = means - given
-    if np.hypot(*difference) > contradiction:
-        north, east = given
-        mean_north, mean_east = means
-        raise InputError(
-            f"trial {trial.name!r}: expected columns current_north and current_east to"
-            f" agree with current = {{ north = {north:g}, east = {east:g} }}, got means"
-            f" of {mean_north:.2f} and {mean_east:.2f} m/s; leave one of them out"
-        )
 
 
 def wald_probability(mean: Floats, covariance: Floats) -> float:

@@ -1,19 +1,17 @@
-"""Accelerations of a ship by the wind of her trials: measured, or constant in each."""
+"""Accelerations of a ship by the wind that was logged on her trials."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from identification.samples.samples import Samples
 from identification.samples.velocities import CURRENT_COLUMNS
-from shipgym import InputError, Particulars, Trial
+from shipgym import Particulars, Trial
 from shipgym.arrays import Floats
 from shipgym.models.simulate import WIND
 from shipgym.sea.wind import AIR_DENSITY, WindCurves, wind_curves
 from shipgym.sea.wind_coefficients import WindTable
 from shipgym.ships.inertia import particulars_inertia
-from shipgym.ships.structures import MMG
 from shipgym.trials.navigation import rotate_to_body
 
 
@@ -104,62 +102,3 @@ def _felt_wind(trial: Trial, relative: bool) -> tuple[Floats, Floats]:
         east = east + trial["current_east"]
     ahead, aside = rotate_to_body(north, east, trial["psi"])
     return ahead + trial["u"], aside + trial["v"]
-
-
-def constant_wind(
-    trials: Sequence[Trial],
-    samples: Samples,
-    structure: Any,
-) -> dict[str, dict[str, float]]:
-    """Constant sway and yaw acceleration that the regression asks for, by trial.
-
-    A constant of the structure's own takes their mean. The MMG form has no regression:
-    InputError.
-    """
-    if structure == MMG:
-        raise InputError(
-            "wind: expected a structure that is linear in its coefficients with"
-            " 'constant', or columns wind_speed and wind_from, got structure 'mmg'"
-        )
-    found: dict[str, dict[str, float]] = {trial.name: {} for trial in trials}
-    for q in ("v", "r"):
-        if q in samples.targets:
-            constants = _constants(samples, q, len(trials))
-            for trial, constant in zip(trials, constants.tolist(), strict=True):
-                found[trial.name][WIND[q]] = constant
-    return found
-
-
-def _constants(samples: Samples, equation: str, n_trials: int) -> Floats:
-    """The constant of each trial in the regression of an equation."""
-    features = samples.features[equation]
-    targets = samples.targets[equation]
-    is_own = samples.trial[:, None] == np.arange(n_trials)
-    of_trials = is_own * samples.duration[:, None]
-    columns = np.hstack([features, of_trials])
-    solution, *_ = np.linalg.lstsq(columns, targets)
-    constants: Floats = solution[-n_trials:]
-    if _explains(features, samples.duration):
-        constants = constants - constants.mean()
-    return constants
-
-
-def _explains(features: Floats, target: Floats, rounding: float = 1e-6) -> bool:
-    """Tell whether features explain a target but for rounding."""
-    solution, *_ = np.linalg.lstsq(features, target)
-    left = target - features @ solution
-    size_left = np.linalg.norm(left)
-    size = np.linalg.norm(target)
-    return bool(size_left < rounding * size)
-
-
-def with_constant_wind(
-    trial: Trial, constants: Mapping[str, Mapping[str, float]]
-) -> Trial:
-    """The trial with its constants of all, by name; itself where it has none."""
-    own = constants.get(trial.name, {})
-    if not own:
-        return trial
-    return trial.with_channels(
-        {name: np.full(len(trial), value) for name, value in own.items()}
-    )

@@ -24,7 +24,7 @@ from shipgym import RecordEpisode, example_ship, load_model
 from tests.agents.small_suite import write_suite
 
 LINEAR = (
-    "--structure abkowitz --method ridge --preprocessing savgol --hold-out"
+    "--structure abkowitz --method ridge --preprocessing rts --hold-out"
     " zigzag_15_15.csv --current none --wind none --prior auto --prior-strength 1"
     " --uncertainty analytic --set alpha=0.01"
 )

@@ -70,7 +70,7 @@ def test_options_come_from_the_ship_file(ship, demo):
             'optimiser = { name = "pso", rounds = 5 }',
             "bounds = [1.0, 1e6]",
             'samples = { rule = "integral", window = 9 }',
-            'preprocessing = "savgol"',
+            'preprocessing = "rts"',
             "repair = true",
             'name = "mine"',
             f'hold_out = ["{held}"]',
@@ -85,7 +85,7 @@ def test_options_come_from_the_ship_file(ship, demo):
     assert told["method"]["bounds"] == [1.0, 1e6]
     assert told["method"]["optimiser"] == {"name": "pso", "rounds": 5}
     assert told["samples"] == {"rule": "integral", "window": 9}
-    assert told["preprocessing"] == {"smoothing": "savgol", "repair": True}
+    assert told["preprocessing"] == {"smoothing": "rts", "repair": True}
     assert told["prior"] == {"source": "clarke", "strength": 0.1, "folds": "trials"}
     asked = {"covariance": "analytic", "model_error": False}
     assert asked.items() <= told["uncertainty"].items()
@@ -266,7 +266,7 @@ def test_options_of_the_command_line_reach_the_settings(ship, demo, tmp_path):
         "--set",
         "C=1e4",
         "--preprocessing",
-        "savgol",
+        "rts",
         "--set",
         "repair=true",
         "--set",
@@ -289,7 +289,7 @@ def test_options_of_the_command_line_reach_the_settings(ship, demo, tmp_path):
         "robust": False,
     }
     assert found["samples"]["window"] == 9
-    assert found["preprocessing"] == {"smoothing": "savgol", "repair": True}
+    assert found["preprocessing"] == {"smoothing": "rts", "repair": True}
     assert found["uncertainty"]["covariance"] == "bootstrap"
     assert (found["prior"]["source"], found["prior"]["strength"]) == ("kijima", 0.5)
     assert found["hold_out"] == [held]

@@ -10,19 +10,11 @@ import numpy as np
 import pytest
 
 from identification import Uncertainty, identify
-from identification.judging.sentences import current_text, sea_sentences
+from identification.judging.sentences import sea_sentences
 from identification.report.predictions import track_figure
 from identification.samples.current import estimate_current
 from identification.samples.still_water import in_still_water
-from identification.samples.surge_sway import (
-    MEAN,
-    Coefficients,
-    SurgeSwayInputs,
-    accelerations,
-)
-from identification.samples.trial_currents import currents_of, wald_probability
 from identification.samples.velocities import through_water
-from identification.samples.wind import measured_wind
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, zigzag
@@ -84,18 +76,12 @@ def test_a_current_is_found_and_taken_out(
     )
     np.testing.assert_allclose(drift, (row["north"], row["east"]))
     assert found[0].raw.sha256 == logs[0].sha256
-    fit = SimpleNamespace(model=SimpleNamespace(provenance=report), trials=found)
-    figure = track_figure(fit)
-    assert [trace.name for trace in figure.data[:3]] == [
+    fit: Any = SimpleNamespace(model=SimpleNamespace(provenance=report), trials=found)
+    assert [trace.name for trace in track_figure(fit).data[:3]] == [
         "over ground",
         "through the water",
         "the water meanwhile",
     ]
-    assert figure.layout.annotations[0].text.startswith("turn: 0.5")
-    away = np.array([[row["east"]], [row["north"]]]) * found[0].duration * [0.0, 1.0]
-    ends = np.array([[found[0]["y"][-1]], [found[0]["x"][-1]]]) + away
-    np.testing.assert_allclose([figure.data[2].x, figure.data[2].y], ends, rtol=1e-6)
-    assert track_figure(SimpleNamespace(model=mariner, trials=found)) is None
     told = sea_sentences(report)[0]
     assert told.startswith("turn, zigzag, held out: current of 0.5")
     assert told.endswith("which differs from zero; removed")
@@ -165,13 +151,6 @@ def straight(psi_deg: float) -> Trial:
     return Trial(np.arange(100.0), channels, name="run", over_ground=True)
 
 
-def test_a_current_is_estimated_from_trials_of_five_ship_lengths() -> None:
-    """99 s at 2 m/s."""
-    for length, is_known in ((39.5, True), (39.7, False)):
-        found = currents_of([straight(40.0)], length, 2.0, "shared")
-        assert ("run" in found) == is_known
-
-
 @pytest.mark.parametrize(
     ("psi_deg", "one_heading"),
     [(32.0, False), (31.5, True)],  # cos 32 deg is 0.848, cos 31.5 deg 0.853
@@ -186,30 +165,16 @@ def test_a_current_is_known_by_several_headings(
     assert keeps == one_heading
 
 
-def test_a_current_in_columns_and_one_given_agree_to_a_decimetre_per_second() -> None:
-    logged = straight(40.0).with_channels(
-        {"current_north": np.full(100, 0.2), "current_east": np.zeros(100)}
-    )
-    near: Any = {"north": 0.2, "east": 0.099}
-    assert currents_of([logged], 7.0, 2.0, near)["run"].source == "columns"
-    far: Any = {"north": 0.2, "east": 0.101}
-    with pytest.raises(
-        InputError, match=r"current_north.*got means of 0\.20 and 0\.00"
-    ):
-        currents_of([logged], 7.0, 2.0, far)
-
-
 @pytest.mark.parametrize(
     ("option", "which", "said"),
     [
-        ("slack", [0], r"current: .*'auto', 'shared', 'trial', 'none'"),
+        ("slack", [0], r"current: .*'auto', 'none'"),
         ({"north": 1.0}, [0], "east"),
         (
             {"north": 9.0, "east": 0.0},
             [0],
             "expected less than the ship's speed of 7.72 m/s, got 9",
         ),
-        ("shared", [1], "the trials keep to one heading; add a turn of a whole circle"),
     ],
 )
 def test_currents_that_cannot_be(
@@ -217,22 +182,6 @@ def test_currents_that_cannot_be(
 ) -> None:
     with pytest.raises(InputError, match=said):
         in_still_water([logs[k] for k in which], mariner.particulars, option)
-
-
-def test_columns_that_contradict_a_given_current(
-    mariner: ShipModel, logs: list[Trial]
-) -> None:
-    columns = {
-        name: np.full(len(logs[0]), 0.5) for name in ("current_north", "current_east")
-    }
-    with pytest.raises(
-        InputError, match=r"current = { north = 0\.1.*means of 0\.50 and 0\.50"
-    ):
-        in_still_water(
-            [logs[0].with_channels(columns)],
-            mariner.particulars,
-            {"north": 0.1, "east": 0.0},
-        )
 
 
 def test_one_heading_is_left_as_it_is_with_a_word(
@@ -292,31 +241,6 @@ def test_measured_wind_is_taken_out(mariner: ShipModel) -> None:
     assert near < 0.2 * far
 
 
-def test_a_constant_wind_of_each_trial(mariner: ShipModel) -> None:
-    """A yaw acceleration of one of two trials is what the fit finds between them."""
-    runs = [
-        zigzag(mariner, 15, 15, port, 300.0, 0.5).with_(name=str(port))
-        for port in (False, True)
-    ]
-    pushed = open_loop(
-        mariner, runs[0].with_channels({"wind_rdot": np.full(len(runs[0]), 2e-6)})
-    )
-    fit = identify(
-        [pushed, runs[1]],
-        wind="constant",
-        particulars=mariner.particulars,
-        steering=mariner.steering,
-        uncertainty=Uncertainty(model_error=False),
-    )
-    found = fit.model.provenance["wind"]["accelerations"]
-    assert found["False"]["wind_rdot"] - found["True"]["wind_rdot"] == pytest.approx(
-        2e-6, rel=0.1
-    )
-    assert "False: constant acceleration removed, vdot" in " ".join(
-        sea_sentences(fit.model.provenance)
-    )
-
-
 def test_wind_without_what_it_needs(mariner: ShipModel) -> None:
     run = zigzag(
         mariner, 10, 10, duration=200.0, dt=1.0, weather=Weather(wind=Wind(9.0, 60.0))
@@ -341,36 +265,6 @@ def test_wind_without_what_it_needs(mariner: ShipModel) -> None:
         )
 
 
-def test_the_wind_that_a_ship_feels_is_that_of_her_way_over_ground(
-    mariner: ShipModel,
-) -> None:
-    """In sway and yaw alike, over ground or through a current in columns."""
-    t = np.arange(0.0, 40.0, 0.5)
-    psi, north, east = 0.05 * t, 0.8, -0.5
-    own = {
-        "psi": psi,
-        "delta": 0.0 * t,
-        "r": 0.05 + 0.0 * t,
-        "wind_speed": 9.0 + 0.0 * t,
-        "wind_from": 1.0 + 0.0 * t,
-    }
-    drift = {"current_north": north + 0.0 * t, "current_east": east + 0.0 * t}
-    ahead, aside = (
-        north * np.cos(psi) + east * np.sin(psi),
-        east * np.cos(psi) - north * np.sin(psi),
-    )
-    through = Trial(
-        t, {**own, **drift, "u": 7.0 + 0.0 * t, "v": -0.3 + 0.0 * t}, over_ground=False
-    )
-    ground = Trial(t, {**own, "u": 7.0 + ahead, "v": aside - 0.3}, over_ground=True)
-    felt = [
-        measured_wind(trial, mariner.particulars, "auto") for trial in (through, ground)
-    ]
-    for name in ("wind_vdot", "wind_rdot"):
-        np.testing.assert_allclose(felt[0][name], felt[1][name], rtol=1e-9)
-        assert np.abs(felt[0][name]).max() > 0.0
-
-
 def test_the_jackknife_is_as_wide_as_estimates_scatter(mariner: ShipModel) -> None:
     """Of ten logs with noise of their own the errors are of the size that is told."""
     scaled = []
@@ -381,121 +275,3 @@ def test_the_jackknife_is_as_wide_as_estimates_scatter(mariner: ShipModel) -> No
         scaled.append(error / np.sqrt(np.diag(found.covariance)))
         np.testing.assert_allclose(found.covariance, found.covariance.T)
     assert 0.2 < np.sqrt(np.mean(np.square(scaled))) < 2.0
-
-
-def test_trials_share_a_current_or_have_each_their_own(
-    mariner: ShipModel, logs: list[Trial]
-) -> None:
-    one = estimate_current(logs[:2], 160.9, 7.7, shared=True)
-    np.testing.assert_array_equal(one.mean[:2], one.mean[2:])
-    each = estimate_current(logs[:2], 160.9, 7.7, shared=False)
-    assert not np.array_equal(each.mean[:2], each.mean[2:])
-    # the coefficients of an estimate are not fitted again
-    known = estimate_current(logs[2:], 160.9, 7.7, True, one.coefficients)
-    np.testing.assert_allclose(known.coefficients, one.coefficients, atol=1e-2)
-
-
-def test_values_differ_from_zero_by_their_covariance() -> None:
-    """Of two normal numbers the squared distance is exponential: exp(-d^2 / 2)."""
-    assert wald_probability(np.zeros(2), np.eye(2)) == 1.0
-    near = wald_probability(np.array([0.3, 0.0]), 0.01 * np.eye(2))
-    assert near == pytest.approx(np.exp(-4.5))
-    correlated = np.array([[2.0, 1.0], [1.0, 2.0]])
-    far = wald_probability(np.array([3.0, 3.0]), correlated)
-    assert far == pytest.approx(np.exp(-3.0))
-
-
-def test_captive_trials_and_those_of_unknown_speed_keep_their_current(
-    mariner: ShipModel,
-) -> None:
-    t = np.arange(50.0)
-    drift = {"current_north": np.full(50, 0.2), "current_east": np.zeros(50)}
-    track = {"x": 5.0 * t, "y": 0.0 * t, "psi": 0.0 * t}
-    towed = Trial(
-        t,
-        {**track, **drift, "u": 5.0 + 0.0 * t, "v": 0.0 * t},
-        name="towed",
-        kind="captive",
-    )
-    (found,), report = in_still_water([towed], mariner.particulars)
-    assert found is towed
-    assert report == {}
-    slow = Trial(t, {**track, **drift}, name="slow")
-    (found,), report = in_still_water([slow], {"length": 7.0})
-    assert found is slow
-    assert report == {}
-    (found,), report = in_still_water([slow], {"length": 7.0, "speed": 2.0})
-    np.testing.assert_allclose(found["x"], 4.8 * t)
-    assert report["currents"]["slow"]["taken_out"]
-
-
-def test_what_a_ship_of_the_prior_does_is_the_same_to_both_sides() -> None:
-    """Sway changes sign with drift, turn, rudder and wind; surge does not."""
-    c = Coefficients(*np.random.default_rng(0).normal(size=len(MEAN)))._replace(Y_0=0.0)
-    at = SurgeSwayInputs(r=0.4, delta=0.3, n=1.1, ahead=0.02, aside=0.05)
-    mirrored = at._replace(r=-0.4, delta=-0.3, aside=-0.05)
-    surge, sway = accelerations(0.9, 0.2, at, c)
-    expected = (pytest.approx(surge), pytest.approx(-sway))
-    assert accelerations(0.9, -0.2, mirrored, c) == expected
-    # at her speed ahead on a straight course only the propeller and the wind act
-    straight_on = accelerations(1.1, 0.0, at._replace(r=0.0, delta=0.0), c)
-    assert straight_on == (
-        pytest.approx(c.X_0 + 0.02 * c.wind),
-        pytest.approx(0.05 * c.wind),
-    )
-
-
-@pytest.mark.parametrize(
-    ("row", "said"),
-    [
-        (
-            {
-                "source": "trial",
-                "standard_errors": (0.01, 0.02),
-                "probability": 0.009,
-                "taken_out": True,
-            },
-            (
-                "its own, north 0.300 ± 0.020, east -0.400 ± 0.039 m/s (95 %), which"
-                " differs from zero; removed"
-            ),
-        ),
-        (
-            {
-                "source": "all trials",
-                "standard_errors": (0.1, 0.2),
-                "probability": 0.0101,
-                "taken_out": False,
-            },
-            (
-                "one for all, north 0.300 ± 0.196, east -0.400 ± 0.392 m/s (95 %),"
-                " which does not differ from zero; left in"
-            ),
-        ),
-        (
-            {"source": "all trials", "taken_out": False},
-            (
-                "one for all, a guess without an interval, as the trials keep to one"
-                " heading; left in"
-            ),
-        ),
-        ({"source": "given", "taken_out": True}, "as given; removed"),
-        ({"source": "columns", "taken_out": True}, "from columns; removed"),
-    ],
-)
-def test_a_current_is_told_with_set_and_drift_and_what_became_of_it(row, said):
-    """A knot is 0.514444 m/s; the water sets to the north-west, 53 deg from north."""
-    told = current_text({"north": NORTH, "east": EAST, **row})
-    assert told == f"current of 0.50 m/s (0.97 knots) towards 307 deg, {said}"
-
-
-def test_winds_are_told_by_their_range_and_by_what_was_removed_of_each_trial():
-    wind = {
-        "mean_speeds": {"a": 4.24, "b": 12.3},
-        "accelerations": {"runs/a.csv": {"wind_vdot": 0.0123, "wind_rdot": -2.5e-5}},
-    }
-    assert sea_sentences({"wind": wind}) == [
-        "wind of 4.2 to 12 m/s on average: its forces are removed",
-        "a.csv: constant acceleration removed, vdot 0.012 m/s², rdot -2.5e-05 rad/s²",
-    ]
-    assert sea_sentences({}) == []

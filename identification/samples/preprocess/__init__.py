@@ -1,9 +1,8 @@
 """Preparation of a noisy record: channels that can be differentiated."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from identification.samples.preprocess.filters import median, savitzky_golay, smooth
 from identification.samples.preprocess.noise import (
     NOISY,
     is_noisy,
@@ -11,19 +10,13 @@ from identification.samples.preprocess.noise import (
     noise_ratio,
 )
 from identification.samples.preprocess.repair import outliers, repaired
+from identification.samples.preprocess.splines import smooth
 from shipgym import Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_flag
 
-#: Filters of single channels by name.
-FILTERS: dict[str, Callable[[Floats, Floats], Floats]] = {
-    "spline": smooth,
-    "savgol": savitzky_golay,
-    "median": median,
-}
-
 #: What `identify` may do with noisy channels.
-PREPROCESSING = (*FILTERS, "rts", "none")
+PREPROCESSING = ("spline", "rts", "none")
 
 
 @dataclass(frozen=True)
@@ -32,10 +25,10 @@ class Preprocessing:
 
     Parameters
     ----------
-    smoothing : {"spline", "savgol", "median", "rts", "none"}
-        Smoothing splines fitted to the noise level; Savitzky-Golay filter; running
-        median; Kalman filter and Rauch-Tung-Striebel smoother, with position and
-        heading; or channels as recorded.
+    smoothing : {"spline", "rts", "none"}
+        Smoothing splines fitted to the noise level; Kalman filter and
+        Rauch-Tung-Striebel smoother, with position and heading; or channels as
+        recorded.
     repair : bool
         Whether outliers are replaced and dropouts of up to 10 steps filled first; the
         provenance counts them.
@@ -69,27 +62,23 @@ def smoothed_channels(
         trial = kinematics.smooth_kinematics(trial)
         kept |= {*kinematics.HEADING, *kinematics.PLANE}
 
-    filtered = FILTERS.get(smoothing, smooth)
     channels = {}
     for name in names:
         channels[name] = trial[name]
         if name not in kept:
-            channels[name] = filtered(trial.t, trial[name])
+            channels[name] = smooth(trial.t, trial[name])
     return channels
 
 
 __all__ = [
-    "FILTERS",
     "NOISY",
     "PREPROCESSING",
     "Preprocessing",
     "is_noisy",
-    "median",
     "noise_level",
     "noise_ratio",
     "outliers",
     "repaired",
-    "savitzky_golay",
     "smooth",
     "smoothed_channels",
 ]

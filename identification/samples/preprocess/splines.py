@@ -1,88 +1,17 @@
-"""Filters of single channels: running median, Savitzky-Golay and smoothing splines."""
+"""Smoothing splines of single channels."""
 
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import solveh_banded
-from scipy.ndimage import median_filter
-from scipy.signal import savgol_coeffs, savgol_filter
 
-from identification.arrays import mean_square
 from identification.samples.preprocess.noise import NOISY, noise_ratio
 from shipgym.arrays import Floats
 from shipgym.trials.resampling import usual_step
 
-ORDER = 3  # of the local polynomials
-SHORTEST_WIDTH = ORDER + 2
 #: Decades of stiffness tried, of a spline on knots a unit apart.
 STIFFNESSES = tuple(float(stiffness) for stiffness in np.arange(-2.0, 8.01, 0.25))
-
-
-def median(t: ArrayLike, values: ArrayLike, width: int = 5) -> Floats:
-    """Running median of `width` samples, odd.
-
-    It takes away spikes of up to half its width and keeps steps.
-    """
-    return median_filter(np.asarray(values, dtype=float), width, mode="nearest")
-
-
-def savitzky_golay(t: ArrayLike, values: ArrayLike, width: int | None = None) -> Floats:
-    """Local cubic polynomials by least squares.
-
-    Source: Savitzky & Golay 1964, Analytical Chemistry 36(8). Records with uneven steps
-    are filtered on an even grid with as many samples.
-
-    Parameters
-    ----------
-    t, values : array-like of shape (n_samples,)
-        Times, s, and the channel.
-    width : int, optional
-        Samples, odd, at least 5; by default the one that generalised cross-validation
-        picks, of at most a fifth of the record. Without a width, values that are free
-        of noise (`noise.NOISY`) or fewer than 25 are returned as they are.
-    """
-    t = np.asarray(t, dtype=float)
-    values = np.asarray(values, dtype=float)
-    if width is None:
-        is_short = len(t) < 5 * SHORTEST_WIDTH
-        if is_short or noise_ratio(t, values) < NOISY:
-            return values
-
-    steps = np.diff(t)
-    unevenness = np.ptp(steps)
-    if unevenness <= 1e-3 * np.median(steps):
-        return _savitzky_golay(values, width)
-
-    grid = np.linspace(t[0], t[-1], len(t))
-    on_grid = np.interp(grid, t, values)
-    filtered = _savitzky_golay(on_grid, width)
-    return np.asarray(np.interp(t, grid, filtered))
-
-
-def _savitzky_golay(values: Floats, width: int | None) -> Floats:
-    """The filter on even steps; without a width the best one."""
-    if width is None:
-        width = _best_width(values)
-    filtered: Floats = savgol_filter(values, width, ORDER)
-    return filtered
-
-
-def _best_width(values: Floats) -> int:
-    """Width of least generalised cross-validation; widths grow by about a fifth."""
-    longest = len(values) // 5
-    sizes = np.geomspace(SHORTEST_WIDTH, longest, 24)
-    odd = 2 * (sizes.astype(int) // 2) + 1
-    widths = np.unique(odd)
-
-    def criterion(width: int) -> float:
-        fitted = savgol_filter(values, width, ORDER)
-        weights = savgol_coeffs(width, ORDER)
-        own_weight = float(weights[width // 2])
-        left_out = mean_square(values - fitted)
-        return left_out / (1.0 - own_weight) ** 2
-
-    return int(min(widths.tolist(), key=criterion))
 
 
 def smooth(t: ArrayLike, values: ArrayLike) -> Floats:
