@@ -37,6 +37,7 @@ from shipgym.manoeuvres import (
 )
 from shipgym.manoeuvres.registry import standard_time
 from shipgym.models.catalogue import LIBRARY
+from shipgym.models.linear import is_course_stable
 from shipgym.trials.sensors import Sensors
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -388,7 +389,7 @@ def candidates() -> None:
     for name, model in models.items():
         turn, *overshoots = errors(model, *CHOSEN_BY_DEG)
         hard = errors(model, COMPARED_DEG[0])[0]
-        stable = shipgym.straight_line_stability(model).stable
+        stable = is_course_stable(model)
         print(
             f"| {name} | {turn:.1f}, {hard:.1f} | {overshoots[0]:.2f} |"
             f" {overshoots[1]:.2f} | {'yes' if stable else 'no'} |",

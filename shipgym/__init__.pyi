@@ -18,8 +18,6 @@ from .models import register_ship_equations as register_ship_equations
 from .models import truth_of as truth_of
 from .models.checker import ModelCheck as ModelCheck
 from .models.checker import check_ship_model as check_ship_model
-from .models.linear import StraightLineStability as StraightLineStability
-from .models.linear import straight_line_stability as straight_line_stability
 from .models.scaling import scale_model as scale_model
 from .sea.conditions import Current as Current
 from .sea.conditions import Waves as Waves

@@ -3,9 +3,7 @@
 Sources: Nomoto, Taguchi, Honda & Hirano 1957, On the steering qualities of ships,
 International Shipbuilding Progress 4; Fossen 2011, Handbook of Marine Craft
 Hydrodynamics and Motion Control, 7.2 (second-order transfer function, T = T1 + T2 -
-T3). Whether a ship holds a straight course by itself: Davidson & Schiff 1946, Turning
-and course-keeping qualities, Trans. SNAME 54; Lewis 1989, Principles of Naval
-Architecture III, chapter IX, section 4 (the criterion C).
+T3).
 """
 
 from dataclasses import dataclass
@@ -14,13 +12,10 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
-from shipgym.models.by_name import takes_name
 from shipgym.models.ship_model import ShipModel
-from shipgym.ships.inertia import inertia
 
 #: Largest neutral rudder, rad: beyond, a model is not that of a ship.
 LARGEST_RUDDER = np.radians(20.0)
-SIDES = {"starboard": 1, "port": -1}
 # unknowns of a balance, and the rate that each brings to 0
 BALANCED_BY = {"u": "u", "v": "v", "delta": "r", "phi": "p", "q": "q", "n": "n"}
 
@@ -208,15 +203,12 @@ def _prime_rates(model: ShipModel, state: dict[str, float]) -> dict[str, float]:
     return rates
 
 
-def linearise(
-    model: ShipModel, at: StraightRunning, side: int = 0
-) -> tuple[Floats, Floats]:
+def linearise(model: ShipModel, at: StraightRunning) -> tuple[Floats, Floats]:
     """Linear steering dynamics about a state without yaw rate, by differences.
 
     Speed and shaft are kept. Roll, where the model knows it, is taken to follow at
     once. Where even the smallest turns to either side differ, as with the flow at
-    KVLCC2's rudder, the mean of both is taken (`side` 0), or the turns to starboard (1)
-    or to port (-1).
+    KVLCC2's rudder, the mean of both is taken.
 
     Returns A, shape (2, 2), and B, (2, 1), of d/dt (v, r) = A (v, r) + B delta:
     deviations in SI units, delta positive to starboard. In a table with a memory q of
@@ -226,7 +218,7 @@ def linearise(
     states = [sway, "r"]
     inputs = [*states, "delta"]
     roll: list[str] = [name for name in ("p", "phi") if name in model.state_names]
-    jacobian = _jacobian(model, at, [*states, *roll], side)
+    jacobian = _jacobian(model, at, [*states, *roll])
     steering = _block(jacobian, states, inputs)
     if roll:
         # roll is balanced, 0 = R_s s + R_p p, s = (v, r, delta): p = -R_p^-1 R_s s
@@ -245,13 +237,10 @@ def linearise(
 
 
 def _jacobian(
-    model: ShipModel, at: StraightRunning, rates: list[str], side: int
+    model: ShipModel, at: StraightRunning, rates: list[str]
 ) -> dict[tuple[str, str], float]:
-    """Derivatives of rates by states and rudder, prime system, by the names of both.
-
-    By central differences, or by one-sided ones to starboard (1) or port (-1).
-    """
-    size = 1e-4  # prime system; the error of central differences is its square
+    """Derivatives of rates by states and rudder, prime system, by the names of both."""
+    step = 1e-4  # prime system; the error of central differences is its square
     units = _units(model)
     values = at.state(model).tolist()
     state = dict(zip(model.state_names, values, strict=True))
@@ -266,14 +255,10 @@ def _jacobian(
 
     jacobian = {}
     for name in (*rates, "delta"):
-        step = size
-        if side:  # a ship turns to starboard as she drifts to port
-            step = -size * side if name == rates[0] else size * side
         ahead = rates_off(name, step)
-        behind = rates_off(name, 0.0 if side else -step)
-        width = step if side else 2.0 * step
+        behind = rates_off(name, -step)
         for rate in rates:
-            jacobian[rate, name] = (ahead[rate] - behind[rate]) / width
+            jacobian[rate, name] = (ahead[rate] - behind[rate]) / (2.0 * step)
     return jacobian
 
 
@@ -343,78 +328,3 @@ def is_course_stable(model: ShipModel) -> bool:
     """
     A, _ = steering_state_space(model)
     return bool(np.all(np.linalg.eigvals(A).real < 0.0))
-
-
-@dataclass(frozen=True)
-class StraightLineStability:
-    """Straight-line stability with the rudder held."""
-
-    # of sway and yaw for the smallest turns to `starboard` and to `port`, 1/s, the
-    # largest real part first. They are the same for a ship symmetric to both sides
-    eigenvalues: dict[str, tuple[complex, ...]]
-    # C = Y_v (N_r - m xG) - N_v (Y_r - m) of either side, prime system: positive for a
-    # stable ship. None where the particulars do not tell the mass
-    criterion: dict[str, float] | None
-
-    @property
-    def index(self) -> float:
-        """Largest real part of either side's eigenvalues, 1/s: negative if stable."""
-        return max(values[0].real for values in self.eigenvalues.values())
-
-    @property
-    def stable(self) -> bool:
-        """True where a disturbance to either side dies out."""
-        return self.index < 0.0
-
-    @property
-    def unstable_sides(self) -> tuple[str, ...]:
-        """Sides to which the ship leaves its course by itself."""
-        return tuple(
-            side
-            for side, values in self.eigenvalues.items()
-            if not values[0].real < 0.0
-        )
-
-
-@takes_name
-def straight_line_stability(model: ShipModel) -> StraightLineStability:
-    """Straight-line stability with rudder, speed and shaft fixed and roll balanced.
-
-    The criterion is the determinant of the linear derivatives of force, which is that
-    of the inertia times that of the linearised accelerations; the inertia is positive,
-    so both tell the same. Raises InputError if the model has no straight course.
-    """
-    at = straight_running(model)
-    matrices = {}
-    eigenvalues = {}
-    for name, side in SIDES.items():
-        A, _ = linearise(model, at, side)
-        values = np.linalg.eigvals(A)
-        falling = np.argsort(-values.real, kind="stable")
-        matrices[name] = A
-        eigenvalues[name] = tuple(values[falling].tolist())
-    return StraightLineStability(
-        eigenvalues=eigenvalues,
-        criterion=_criterion(model, matrices),
-    )
-
-
-def _criterion(
-    model: ShipModel, matrices: dict[str, Floats]
-) -> dict[str, float] | None:
-    """Determinant of the force derivatives, prime system; None without sway or mass."""
-    if "q" in model.state_names:
-        return None
-    try:
-        sway_and_yaw = inertia(model)[1:, 1:3]
-        p = model.particulars.completed()
-        mass_unit = 0.5 * p.require("water_density") * p.length**3
-    except InputError:
-        return None
-    unit = (mass_unit * model.particulars["speed"]) ** 2
-    mass = np.linalg.det(sway_and_yaw)
-    criterion = {}
-    for name, A in matrices.items():
-        forces = mass * np.linalg.det(A)
-        criterion[name] = float(forces / unit)
-    return criterion

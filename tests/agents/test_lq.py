@@ -12,7 +12,7 @@ from agents import LQ, PID, sail, step_response
 from agents.controllers.linear_loop import rate_weight, sample_ship, sampled
 from agents.controllers.lq import SteeringCost, lq_gain
 from shipgym.errors import InputError
-from shipgym.models.conversions import nomoto, nomoto2_ship
+from shipgym.models.linear import nomoto
 from shipgym.ships.steering import SteeringGear
 from shipgym.tasks.scales import RUDDER_WEIGHT, control_interval
 from tests.agents.mariners import (
@@ -22,6 +22,7 @@ from tests.agents.mariners import (
     UNSTABLE,
     changed,
 )
+from tests.ships.nomoto import nomoto2_ship
 
 
 def linear_cost(ship, gain, cost, n=4000):

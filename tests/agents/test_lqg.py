@@ -13,13 +13,13 @@ from agents.controllers.law import Signals
 from agents.controllers.linear_loop import sample_ship
 from agents.controllers.memory import from_columns
 from shipgym.errors import InputError
-from shipgym.models.conversions import nomoto, nomoto2_ship
-from shipgym.models.linear import straight_running
+from shipgym.models.linear import nomoto, straight_running
 from shipgym.ships.steering import SteeringGear
 from shipgym.tasks.scales import control_interval
 from shipgym.tasks.task import course_keeping_task
 from shipgym.trials.sensors import SEA_TRIAL
 from tests.agents.mariners import MARINER, changed
+from tests.ships.nomoto import nomoto2_ship
 
 UNSTABLE = changed(N_v=1.7, N_uv=1.7)
 

@@ -28,7 +28,6 @@ from agents.verification.result import verification_metrics
 from agents.verification.view import verification_view
 from identification.design.experiment import advise
 from shipgym import InputError, ShipFile, Trial, load_model
-from shipgym.models.conversions import nomoto1_ship
 
 
 @pytest.fixture
@@ -119,13 +118,6 @@ def test_an_unstable_design_names_the_options_to_change():
         InputError, match=r"shorter control interval dt, and a lower frequency \(PID\)"
     ):
         PID.from_model(load_model("mariner"), frequency=0.01, damping=20.0, dt=30.0)
-
-
-def test_nomotos_ship_takes_particulars_as_a_mapping():
-    ship = nomoto1_ship(0.1, 20.0, {"length": 100.0, "speed": 7.0})
-    assert ship.particulars.length == 100.0
-    with pytest.raises(InputError, match="expected a table"):
-        nomoto1_ship(0.1, 20.0, 100.0)
 
 
 def test_advice_is_not_about_a_coefficient_near_zero(fit):

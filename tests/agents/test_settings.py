@@ -14,9 +14,9 @@ from agents.training.settings import (
     make_settings,
     read_settings_file,
 )
-from shipgym import InputError
-from shipgym.models.conversions import nomoto1_ship
+from shipgym import InputError, Particulars
 from shipgym.sea import Current, Weather
+from tests.ships.nomoto import nomoto1_ship
 
 FREE = {"base": "none", "authority": 1.0}
 
@@ -157,7 +157,7 @@ def test_domain_randomisation_draws_ships_seas_and_speeds_and_leaves_what_was_as
         "bounded": True,
     }
     assert options("mariner", settings=alone) == {"bounded": True}  # no covariance
-    bare = nomoto1_ship(0.1, 20.0, {"length": 160.0, "speed": 7.0})
+    bare = nomoto1_ship(0.1, 20.0, Particulars(length=160.0, speed=7.0))
     bare.save(tmp_path / "ship.json")
     found = options(tmp_path / "ship.json", randomise=True)
     assert [sea.name for sea in found["sea"]] == ["calm"]  # no beam, no weather

@@ -16,10 +16,10 @@ from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
 from shipgym.models import converted_model, grey_box
 from shipgym.models.checker import check_ship_model
-from shipgym.models.conversions import nomoto2_ship
 from shipgym.models.linear import nomoto
 from shipgym.models.scaling import scale_model
 from shipgym.ships.structures import get_structure, register_structure
+from tests.ships.nomoto import nomoto2_ship
 
 pytestmark = pytest.mark.interpreted
 

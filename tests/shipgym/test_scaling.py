@@ -71,19 +71,6 @@ def test_a_steering_model_in_si_units_keeps_its_overshoot():
     assert overshoots[0] == pytest.approx(overshoots[1], rel=1e-8)
 
 
-def test_a_surge_model_stops_in_as_many_ship_lengths_at_another_speed():
-    """Another service speed at the same length: not Froude's, and similar
-    all the same."""
-    ship = small_ship("surge")
-    quick = scale_model(ship, length=160.93, speed=2.0 * 7.7175)
-    assert quick.service_shaft_speed == pytest.approx(2.4)
-    stops = [
-        s.simulate(np.tile([0.0, -s.service_shaft_speed], (300, 1)), dt)
-        for s, dt in ((ship, 0.2), (quick, 0.1))
-    ]
-    np.testing.assert_allclose(stops[0]["x"], stops[1]["x"], rtol=1e-9, atol=1e-9)
-
-
 def test_there_and_back_is_the_ship_itself():
     random = np.random.default_rng(0)
     root = random.standard_normal((8, 8))
@@ -110,15 +97,6 @@ def test_there_and_back_is_the_ship_itself():
         for s in (ship, model)
     ]
     np.testing.assert_allclose(*deviations, rtol=1e-12)
-
-
-def test_fresh_water_at_model_scale_becomes_salt_water():
-    ship = shipgym.load_model("mariner")
-    model = scale_model(ship, 3.0, water_density=1000.0)
-    assert model.particulars.mass_prime == pytest.approx(ship.particulars.mass_prime)
-    assert scale_model(
-        model, 160.93, water_density=1025.0
-    ).particulars.mass == pytest.approx(ship.particulars.mass)
 
 
 @pytest.mark.parametrize(

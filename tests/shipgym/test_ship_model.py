@@ -9,15 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import shipgym
-from shipgym import InputError, ShipModel, UnstableModelError
+from shipgym import InputError, Particulars, ShipModel, UnstableModelError
 from shipgym.engine.envelope import Envelope as EngineEnvelope
 from shipgym.engine.envelope import Four, Triangle, envelope_distance, outside_range
 from shipgym.engine.motion import Motion
-from shipgym.models.conversions import nomoto1_ship
 from shipgym.models.simulate import open_loop
 from shipgym.ships import Envelope, get_structure
 from shipgym.ships.envelope import smallest_ellipsoid
 from shipgym.ships.shared_structure import SharedStructure
+from tests.ships.nomoto import nomoto1_ship
 
 
 @pytest.fixture(scope="module")
@@ -428,7 +428,7 @@ def test_states_and_commands_that_are_none_are_refused():
 
 
 def nomoto_file():
-    ship = nomoto1_ship(0.05, 30.0, {"length": 100.0, "speed": 5.0})
+    ship = nomoto1_ship(0.05, 30.0, Particulars(length=100.0, speed=5.0))
     return json.loads(json.dumps(ship.to_dict()))
 
 

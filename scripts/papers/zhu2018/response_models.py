@@ -22,7 +22,6 @@ from identification.pipeline import identify
 from papers.row import Row
 from shipgym.manoeuvres import zigzag
 from shipgym.models import ShipModel
-from shipgym.models.conversions import nomoto1_ship
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.sensors import Sensor, Sensors
@@ -100,9 +99,9 @@ def ship(speed: float) -> ShipModel:
     gear = SteeringGear(
         rudder_limit_deg=35.0, rudder_rate_deg_s=20.0, time_constant=0.0
     )
-    return nomoto1_ship(
-        K, T, Particulars(name="small ship", length=5.0, speed=speed), gear
-    )
+    particulars = Particulars(name="small ship", length=5.0, speed=speed)
+    coefficients = {"c_r": -1.0 / T, "c_d": K / T}
+    return ShipModel("nomoto", "nomoto", particulars, gear, coefficients)
 
 
 @cache
