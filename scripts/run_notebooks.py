@@ -18,12 +18,17 @@ FOLDER = Path(__file__).parents[1] / "notebooks"
 LONGEST = 600  # s, of a cell
 
 
-def run(path: Path) -> None:
-    """Run a notebook in its folder and write it with its outputs."""
+def executed(path: Path) -> nbformat.NotebookNode:
+    """A notebook with its outputs; CellExecutionError where a cell raises an error."""
     notebook = nbformat.read(path, as_version=4)
-    NotebookClient(
-        notebook, timeout=LONGEST, resources={"metadata": {"path": str(FOLDER.parent)}}
-    ).execute()
+    place = {"metadata": {"path": str(FOLDER.parent)}}
+    NotebookClient(notebook, timeout=LONGEST, resources=place).execute()
+    return notebook
+
+
+def run(path: Path) -> None:
+    """Run a notebook and write it with its outputs."""
+    notebook = executed(path)
     for k, cell in enumerate(notebook.cells):
         cell.id = f"cell-{k}"
         cell.metadata = {}
