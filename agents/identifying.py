@@ -162,11 +162,9 @@ def _names(text: str | None) -> list[str] | None:
 
 
 def reduce_ship(
-    ship: ShipFile, settings: Mapping[str, Any], direction: str, tolerance: float
+    ship: ShipFile, settings: Mapping[str, Any], tolerance: float
 ) -> identification.ReducedIdentification:
     """`identify_reduced` on a ship file."""
     trials, arguments = trials_of(ship, settings)
     with placed(str(ship.path)):
-        return identification.identify_reduced(
-            trials, direction, tolerance, **arguments
-        )
+        return identification.identify_reduced(trials, tolerance, **arguments)

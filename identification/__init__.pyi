@@ -12,9 +12,6 @@ from .design.reduction import (
 from .design.reduction import (
     backward_elimination as backward_elimination,
 )
-from .design.reduction import (
-    forward_selection as forward_selection,
-)
 from .design.sensitivity import (
     sensitivity as sensitivity,
 )

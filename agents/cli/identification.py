@@ -181,9 +181,7 @@ def advise_command(
     ship: ShipFileArgument,
     criterion: Annotated[
         str,
-        Option(
-            help="What to reduce: c (one coefficient), D (volume) or E (longest axis)."
-        ),
+        Option(help="What to reduce: c (one coefficient) or D (volume of all)."),
     ] = "c",
     coefficient: Annotated[
         str | None, Option(help="For criterion c; default: the least certain.")
@@ -216,9 +214,6 @@ def advise_command(
 def reduce_command(
     ship: ShipFileArgument,
     out: Out,
-    direction: Annotated[
-        str, Option(help="backward (drop terms) or forward (add them).")
-    ] = "backward",
     tolerance: Annotated[
         float, Option(min=0.0, help="How far R2 on held-out stretches may fall.")
     ] = 1e-3,
@@ -246,7 +241,7 @@ def reduce_command(
         whole_folder(out, (*FILES, "reduction.json")) as draft,
         identifying("reducing"),
     ):
-        found = reduce_ship(read, settings, direction, tolerance)
+        found = reduce_ship(read, settings, tolerance)
         fields = found.to_dict()
         found.reduced.save(draft)
         if report:

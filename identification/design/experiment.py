@@ -2,8 +2,8 @@
 
 Candidates are simulated on the current model and ranked by what adding their
 information makes of the least covariance (Fedorov 1972, Theory of optimal experiments):
-c-optimal for one coefficient, D-optimal for the volume of the ellipsoid of all of them,
-E-optimal for its longest axis. Coefficients count relative to their size.
+c-optimal for one coefficient, D-optimal for the volume of the ellipsoid of all of them.
+Coefficients count relative to their size.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -45,7 +45,7 @@ class Advice:
     Attributes
     ----------
     criterion : str
-        "c", "D" or "E".
+        "c" or "D".
     coefficient : str
         That which "c" shrinks.
     trials : tuple of TrialInformation
@@ -54,8 +54,7 @@ class Advice:
         Relative standard error of each coefficient from the trials so far.
     steps : tuple of dict of str to float
         Of each choice the gain of all candidates, the largest is best: by what factor
-        the standard error ("c"), the mean axis ("D") or the longest axis ("E") of the
-        relative errors shrinks.
+        the standard error ("c") or the mean axis ("D") of the relative errors shrinks.
     chosen : tuple of str
         The candidates to run, in this order.
     after : dict of str to float
@@ -186,7 +185,7 @@ def standard_candidates(model: ShipModel) -> dict[str, Candidate]:
 
 def check_criterion(criterion: str, coefficient: str | None) -> None:
     """Refuse an unknown criterion, and a coefficient for one of all coefficients."""
-    criteria = ("c", "D", "E")
+    criteria = ("c", "D")
     check_choice(criterion, criteria, "criterion")
     if coefficient is not None and criterion != "c":
         raise InputError(
@@ -218,9 +217,9 @@ def advise(
     candidates : mapping of str to callable, optional
         Simulate a manoeuvre with a model; by default `standard_candidates`. One with
         which the model runs away is left out.
-    criterion : {"c", "D", "E"}
-        What to shrink: the standard error of one coefficient, the volume or the longest
-        axis of the ellipsoid.
+    criterion : {"c", "D"}
+        What to shrink: the standard error of one coefficient, or the volume of the
+        ellipsoid.
     coefficient : str, optional
         Of "c"; by default the one whose standard error changes the accelerations of a
         hard turn most, so that a coefficient near zero is not taken for uncertain.

@@ -139,19 +139,14 @@ def relative_errors(information: Floats, size: Floats) -> Floats:
 def uncertainty(information: Floats, size: Floats, criterion: str, place: int) -> float:
     """The measure that a criterion shrinks, in units of a relative standard error.
 
-    The standard error of the coefficient at a place ("c"), the mean axis ("D") or the
-    longest axis ("E") of the ellipsoid of the relative errors.
+    The standard error of the coefficient at a place ("c"), or the mean axis ("D") of
+    the ellipsoid of the relative errors.
     """
     covariance = relative_covariance(information, size)
     if criterion == "c":
         variance = covariance[place, place]
         return float(np.sqrt(variance))
-
     variances = np.linalg.eigvalsh(covariance)
-    smallest = np.finfo(float).tiny
-    positive = np.maximum(variances, smallest)
-    axes = np.sqrt(positive)
-    if criterion == "D":
-        mean_log = np.mean(np.log(axes))
-        return float(np.exp(mean_log))
-    return float(axes[-1])
+    positive = np.maximum(variances, np.finfo(float).tiny)
+    mean_log = np.mean(np.log(np.sqrt(positive)))
+    return float(np.exp(mean_log))

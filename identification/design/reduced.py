@@ -8,7 +8,6 @@ from typing import Any
 from identification.design.reduction import (
     Reduction,
     backward_elimination,
-    forward_selection,
 )
 from identification.design.sensitivity import zigzag_sensitivity
 from identification.pipeline import identify
@@ -16,7 +15,6 @@ from identification.pipeline.result import IdentificationResult
 from identification.samples.samples import Samples
 from shipgym import InputError, Trial, list_structures, register_structure
 from shipgym.arrays import finite
-from shipgym.checks import check_choice
 from shipgym.ships import GreyBox, Structure, get_structure
 from shipgym.ships.structures import GREY_BOX
 
@@ -77,7 +75,6 @@ def _plain_path(reduction: Reduction) -> list[dict[str, Any]]:
 
 def identify_reduced(
     trials: Sequence[Trial],
-    direction: str = "backward",
     tolerance: float = 1e-3,
     **arguments: Any,
 ) -> ReducedIdentification:
@@ -90,8 +87,6 @@ def identify_reduced(
     ----------
     trials : sequence of Trial
         As for `identify`. Those held out have no part in the reduction either.
-    direction : {"backward", "forward"}
-        Elimination or selection (`reduction`).
     tolerance : float
         By how much the R2 of stretches held out may fall.
     **arguments
@@ -103,7 +98,7 @@ def identify_reduced(
     full = identify(trials, **arguments)
     table = full.model.table
     _check_reducible(table)
-    reductions = reduce(full.samples, table, direction, tolerance)
+    reductions = reduce(full.samples, table, tolerance)
     smaller = reduced_structure(table, reductions, table.name)
     registered = register_structure(
         _name_by_terms(smaller),
@@ -143,21 +138,16 @@ def _name_by_terms(structure: Structure) -> str:
 
 
 def reduce(
-    samples: Samples,
-    structure: Structure,
-    direction: str = "backward",
-    tolerance: float = 1e-3,
+    samples: Samples, structure: Structure, tolerance: float = 1e-3
 ) -> dict[str, Reduction]:
-    """Reduce each equation by elimination ("backward") or selection ("forward").
+    """Reduce each equation by elimination.
 
     Returns the reductions by equation, with the coefficients of the features in SI
     units; the tolerance is that of the held-out R2.
     """
-    check_choice(direction, ("backward", "forward"), "direction")
-    run = backward_elimination if direction == "backward" else forward_selection
     reductions = {}
     for q in structure.equations:
-        reductions[q] = run(
+        reductions[q] = backward_elimination(
             samples.features[q],
             samples.targets[q],
             structure.names(q),

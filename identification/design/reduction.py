@@ -1,10 +1,9 @@
-"""Which terms a regression needs: backward elimination and forward selection.
+"""Which terms a regression needs, by backward elimination.
 
-Backward (Xu 2020, section 5; leave-one-out): among the terms that are uncertain or
-belong to a collinear group drop the one of largest relative standard error, unless what
-is held out is then explained worse. Forward (Chen, Billings & Luo 1989, Int. J. Control
-50(5)): by orthogonal least squares add the term that explains most of what is left.
-Held out are five stretches of the samples, each predicted from the others.
+Among the terms that are uncertain or belong to a collinear group the one of largest
+relative standard error is dropped, unless what is held out is then explained worse (Xu
+2020, section 5). Held out are five stretches of the samples, each predicted from the
+others.
 """
 
 from collections.abc import Sequence
@@ -18,7 +17,6 @@ from identification.arrays import by_name, column_rms
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.judging.diagnostics import (
     COLLINEAR,
-    JITTER,
     correlation_matrix,
     variance_inflation,
 )
@@ -35,7 +33,7 @@ class ReductionStep:
     """A model on the path."""
 
     terms: tuple[str, ...]  # its terms
-    # the term dropped or added to get here; empty for the first model of an elimination
+    # the term dropped to get here; empty for the first model
     changed: str
     #: of each term: coefficient, and standard error by its size
     coefficients: dict[str, float]
@@ -44,7 +42,7 @@ class ReductionStep:
     #: predicted from the others
     r_squared: float
     held_out: float
-    # share that the change explains of all (negative for a term that was dropped)
+    # share that the change explains of all: negative, for the first model all
     error_reduction: float
 
 
@@ -239,76 +237,6 @@ def collinear_terms(features: Floats, kept: Sequence[int]) -> set[int]:
     by_all = variance_inflation(scaled) > largest_inflation
     places = np.flatnonzero(in_pair | by_all).tolist()
     return {kept[place] for place in places}
-
-
-def forward_selection(
-    X: ArrayLike,
-    y: ArrayLike,
-    names: Sequence[str],
-    tolerance: float = 1e-3,
-    most: int | None = None,
-) -> Reduction:
-    """Add terms by error reduction ratio, and choose the shortest model near the best.
-
-    Returns a Reduction whose path goes on beyond the chosen model. Raises InputError
-    for shapes that do not fit and fewer than five samples a term.
-
-    Parameters
-    ----------
-    X, y, names
-        As in `backward_elimination`.
-    tolerance : float
-        By how much the held-out R2 of the chosen model may lie below the best of the
-        path.
-    most : int, optional
-        Terms at which to stop.
-    """
-    regression = _checked(X, y, names)
-    check_number(tolerance, "tolerance", at_least=0.0)
-    order = _by_error_reduction(regression)
-    path = list[ReductionStep]()
-    explained = 0.0
-    for count, term in enumerate(order[: most or None], start=1):
-        name = regression.names[term]
-        step = regression.fitted(order[:count], name, explained)
-        path.append(step)
-        explained = step.r_squared
-
-    return Reduction(tuple(path), chosen=_first_near_best(path, tolerance))
-
-
-def _first_near_best(path: Sequence[ReductionStep], tolerance: float) -> int:
-    """The first model whose held-out R2 is within a tolerance of the best."""
-    held_out = np.array([step.held_out for step in path])
-    near_best = held_out >= held_out.max() - tolerance
-    return int(np.argmax(near_best))
-
-
-def _by_error_reduction(regression: _Regression) -> list[int]:
-    """Terms in the order of what each explains of what those before it leave.
-
-    By orthogonal least squares; without terms that those before make up already.
-    """
-    rest = regression.features / column_rms(regression.features)
-    left = regression.targets.copy()
-    n_samples, n_terms = rest.shape
-    order = list[int]()
-    while len(order) < n_terms:
-        powers = np.sum(rest**2, axis=0)
-        independent = powers > n_samples * JITTER
-        if not independent.any():
-            break
-
-        projections = rest.T @ left
-        ratios = np.full(n_terms, -1.0)
-        np.divide(projections**2, powers, out=ratios, where=independent)
-        term = int(np.argmax(ratios))
-        order.append(term)
-
-        direction = rest[:, term] / np.sqrt(powers[term])
-        left = left - direction * (direction @ left)
-        rest = rest - np.outer(direction, direction @ rest)
-    return order
 
 
 def _checked(X: ArrayLike, y: ArrayLike, names: Sequence[str]) -> _Regression:

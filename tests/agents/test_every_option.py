@@ -49,8 +49,7 @@ LINES = (
     (f"advise ship.toml {LINEAR} --criterion c --coefficient N_d --number 1", 0),
     (f"advise ship.toml {WRONG}", 2),
     (
-        f"reduce ship.toml {LINEAR} --direction forward --tolerance 0.1 --report"
-        " --out reduced",
+        f"reduce ship.toml {LINEAR} --tolerance 0.1 --report --out reduced",
         0,
     ),
     (f"reduce ship.toml {WRONG} --out reduced", 2),
