@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
 if TYPE_CHECKING:
-    from agents.export.c99 import Source
+    from agents.export.source import Source
 
 
 def export_command(
@@ -31,18 +28,15 @@ def export_command(
         Path | None, Option("--c", metavar="FOLDER", help="Write C99: NAME.h, NAME.c.")
     ] = None,
     fmu: Annotated[
-        Path | None, Option(metavar="OUT.FMU", help="Write an FMU for co-simulation.")
+        Path | None,
+        Option(metavar="OUT.FMU", help="Write an FMU for co-simulation, FMI 2.0."),
     ] = None,
-    fmi: Annotated[str, Option(help="Version of the FMU: 3.0 or 2.0.")] = "3.0",
     name: Annotated[
         str | None, Option(help="Name in C and FMU; default: the file's name.")
     ] = None,
     depth: Annotated[
         float, Option(metavar="M", help="For a model: water depth; default: deep.")
     ] = inf,
-    floats: Annotated[
-        bool, Option("--float", help="C99 in single precision; default: double.")
-    ] = False,
 ) -> None:
     """Write an autopilot or a ship model as C99 or FMU.
 
@@ -60,63 +54,21 @@ def export_command(
         raise InputError(
             "--name, --depth: expected with --c or --fmu, got neither; leave them out"
         )
-    if fmu is None and fmi != "3.0":
-        raise InputError(f"--fmi: expected with --fmu, got {fmi} alone; leave it out")
-    if floats and c is None:
-        raise InputError(
-            "--float: expected with --c, got no --c; leave it out, the numbers of an"
-            " FMU are double"
-        )
-
-    in_c = None
-    in_fmu = None
-    if c is not None:
-        in_c = _source(what, name, depth, "float" if floats else "double")
-    if fmu is not None:
-        in_fmu = _source(what, name, depth, "double")
-
-    source = in_c or in_fmu
-    if source is not None:
-        for note in source.notes:
-            warn(note)
-    with _sigterm_ends_in_order():
-        _write(
-            what,
-            in_c,
-            in_fmu,
-            c=c,
-            fmu=fmu,
-            fmi=fmi,
-            onnx=onnx,
-        )
-
+    source = _source(what, name, depth) if has_source else None
+    for note in source.notes if source else ():
+        warn(note)
+    _write(what, source, c=c, fmu=fmu, onnx=onnx)
     written = [str(path) for path in (onnx, c, fmu) if path is not None]
     answer({"written": written})
     say(*(f"written: {path}" for path in written))
 
 
-@contextmanager
-def _sigterm_ends_in_order() -> Iterator[None]:
-    """End on SIGTERM as on Ctrl-C: what is half-written is removed."""
-
-    def leave(number: int, _: Any) -> None:
-        raise SystemExit(128 + number)
-
-    before = signal.signal(signal.SIGTERM, leave)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
 def _write(
     what: str,
-    in_c: Source | None,
-    in_fmu: Source | None,
+    source: Source | None,
     *,
     c: Path | None,
     fmu: Path | None,
-    fmi: str,
     onnx: Path | None,
 ) -> None:
     """Check all files before any is written; write first what may still fail."""
@@ -127,8 +79,8 @@ def _write(
     from shipgym.files import write_bytes
 
     texts = {}
-    if in_c is not None:
-        texts = {f"{in_c.name}.h": in_c.header, f"{in_c.name}.c": in_c.source}
+    if source is not None:
+        texts = {f"{source.name}.h": source.header, f"{source.name}.c": source.source}
     if fmu is not None:
         check_fmu_name(fmu)
     for file in (fmu, onnx):
@@ -138,8 +90,8 @@ def _write(
         check_folder(c, texts)
 
     graph = onnx_model(load_agent(what)) if onnx is not None else None
-    if fmu is not None and in_fmu is not None:
-        write_fmu(in_fmu, fmu, fmi)
+    if fmu is not None and source is not None:
+        write_fmu(source, fmu)
     if onnx is not None and graph is not None:
         write_bytes(graph.SerializeToString(), onnx)
     if c is not None:
@@ -148,7 +100,7 @@ def _write(
                 (draft / file_name).write_text(text, encoding="utf-8")
 
 
-def _source(what: str, name: str | None, depth: float, real: str) -> Source:
+def _source(what: str, name: str | None, depth: float) -> Source:
     """C99 of the controller, policy or model of a file or a name."""
     from agents.agent_file import list_pretrained, load_agent
     from agents.export.autopilot_c99 import autopilot_source
@@ -163,10 +115,10 @@ def _source(what: str, name: str | None, depth: float, real: str) -> Source:
         expected = "file of a controller or a model"
         is_agent |= "kind" in read_json(file, expected, "take another copy")
     if not is_agent:
-        return ship_source(load_model(what), name or file.stem, depth, real)
+        return ship_source(load_model(what), name or file.stem, depth)
     if depth != inf:
         raise InputError(
             f"--depth: expected none for an autopilot, got {depth:g} for {what}; leave"
             " it out"
         )
-    return autopilot_source(load_agent(what), name or file.stem, real)
+    return autopilot_source(load_agent(what), name or file.stem)

@@ -1,10 +1,9 @@
-"""An autopilot as it stands on a bridge: measurements of one ship in, rudder order out.
+"""An autopilot on a bridge: measurements of one ship in, rudder order out.
 
-What it adds to a controller's law are plain functions on records too, which
-`agents.export.autopilot_c99` writes as C. All numbers are in SI units.
+It adds plain functions on records to a controller's law; `agents.export.autopilot_c99`
+writes both as C. All numbers are in SI units.
 """
 
-from collections.abc import Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -22,9 +21,8 @@ from agents.controllers.law import (
     gathered,
     wrapped,
 )
-from agents.controllers.memory import from_columns
+from agents.export.source import Variable, Variables
 from shipgym import InputError
-from shipgym.arrays import Floats
 from shipgym.engine.records import field_types
 from shipgym.tasks import path_following
 from shipgym.tasks.contract import ObservationSpec
@@ -51,6 +49,49 @@ class BridgeInput(NamedTuple):
     next_turn_angle: Number = 0.0
     second_turn_distance: Number = 0.0
     second_turn_angle: Number = 0.0
+
+
+#: What an autopilot may read, with the fields of `BridgeInput`.
+AUTOPILOT_INPUTS: Variables = {
+    "set_point": Variable(
+        "rad",
+        "heading to steer, clockwise from north; of guidance the direction of the path"
+        " beside the ship",
+    ),
+    "heading": Variable("rad", "clockwise from north"),
+    "yaw_rate": Variable("rad/s", "to starboard positive"),
+    "sway": Variable("m/s", "through the water, to starboard positive"),
+    "surge": Variable("m/s", "through the water"),
+    "rudder": Variable("rad", "measured angle, to starboard positive"),
+    "rate_of_turn": Variable(
+        "rad/s",
+        "ordered rate of turn, to starboard positive; 0: to keep the heading to steer",
+    ),
+    "cross_track": Variable(
+        "m", "distance from the leg or arc, to starboard of it positive"
+    ),
+    "course": Variable("rad", "over ground, clockwise from north"),
+    "roll": Variable("rad", "heel"),
+    "roll_rate": Variable("rad/s", "of heel"),
+    "shaft_speed": Variable("1/s", "measured"),
+    "next_turn_distance": Variable(
+        "m", "along the path to where the next turn begins; negative on its arc"
+    ),
+    "next_turn_angle": Variable(
+        "rad", "change of course that is left of it, to starboard positive"
+    ),
+    "second_turn_distance": Variable(
+        "m", "along the path to where the turn after that begins"
+    ),
+    "second_turn_angle": Variable(
+        "rad", "change of course there, to starboard positive"
+    ),
+}
+
+#: Answer of an autopilot.
+AUTOPILOT_OUTPUTS: Variables = {
+    "order": Variable("rad", "ordered rudder, to starboard positive"),
+}
 
 
 class BridgeState(NamedTuple):
@@ -259,105 +300,6 @@ def observation_bounds() -> dict[str, tuple[float, float]]:
     return bounds
 
 
-class Autopilot:
-    """Any controller or policy, stepped once a control interval in double precision.
-
-    Guidance is given the direction of the path beside the ship as its set-point, a
-    policy that learned to follow paths the course that its environment shows.
-
-    Raises InputError for a policy that commands the shaft too, or reads what no ship is
-    known to show.
-
-    Attributes
-    ----------
-    inputs : list of str
-        What it reads.
-    dt : float
-        Control interval, s.
-    limit : float
-        Largest rudder of the ship, rad.
-    """
-
-    def __init__(self, agent: Any) -> None:
-        self.agent = agent
-        self.inputs = needed_inputs(agent)
-        self.pilot: Any = agent
-        if isinstance(agent, Guided):
-            self.pilot = agent.autopilot
-        self.parameters = bridge_parameters(agent)
-        self.dt = self.parameters.dt
-        self.limit = self.parameters.limit
-        self.switch_on()
-        self._given: Any = None
-
-    def switch_on(self) -> None:
-        """Forget what was before; the order is that of the law at once."""
-        guidance: Any = Nothing()
-        if isinstance(self.agent, Guided):
-            guidance = _no_memory(self.agent)
-        zero = np.zeros(1)
-        self.state = BridgeState(
-            integral=zero,
-            last_command=zero,
-            started=zero,
-            memory=_no_memory(self.pilot),
-            guidance=guidance,
-        )
-
-    def step(self, given: Mapping[str, float]) -> float:
-        """Ordered rudder, rad, at most `limit`, for the numbers named in `inputs`."""
-        numbers = {name: np.array([given[name]]) for name in self.inputs}
-        inputs = BridgeInput(**numbers)
-        self._given = inputs
-        p = self.parameters
-        state = self.state
-        if isinstance(self.agent, Guided):
-            order, after = path_step(inputs, state, p, self._guide, self._law)
-        else:
-            order, after = heading_step(inputs, state, p, self._law)
-        self.state = after
-        return float(order[0])
-
-    def _guide(self, seen: PathSignals, memory: Any, _: Any) -> tuple[Number, Any]:
-        """Course of guidance, by its law or by a search of its own."""
-        guide: Guided = self.agent
-        return guide.course(seen, memory)
-
-    def _law(self, seen: Signals, memory: Any, _: Any) -> tuple[Number, Any]:
-        """Rudder of the heading autopilot, by its law or by its network."""
-        if isinstance(self.pilot, Controller):
-            return self.pilot.steer(seen, memory)
-        return self._policy(seen, memory)
-
-    def _policy(self, seen: Signals, memory: Any) -> tuple[Number, Any]:
-        """Rudder of a policy, which is shown what its environment would show."""
-        own = own_observations(
-            error=seen.heading_error,
-            integral=seen.heading_error_integral,
-            given=self._given,
-            last_command=self.state.last_command,
-        )
-        known = {**self._given._asdict(), **own._asdict()}
-
-        shown = observations(self.pilot, known)
-        starts = self.state.started == 0.0
-        action, memory = self.pilot.predict(shown, memory, starts)
-        rudder = action[:, 0].astype(np.float64)
-        return rudder * self.limit, memory
-
-
-def observations(policy: Any, known: Mapping[str, Number]) -> Floats:
-    """Scaled, bounded observations of a policy from known quantities in SI units."""
-    scales = dict(zip(policy.observation_names, policy.observation_scales, strict=True))
-    bounds = observation_bounds()
-    shown = []
-    for name, scale in scales.items():
-        low, high = bounds[name]
-        scaled = known[name] / scale
-        shown.append(np.clip(scaled, low, high))
-    return np.array(shown, dtype=np.float64).T
-
-
 def bridge_parameters(agent: Any) -> BridgeParameters:
     """Parameters of a controller, or of a policy and the base that it adds to."""
     scales = dict(zip(agent.observation_names, agent.observation_scales, strict=True))
@@ -426,12 +368,3 @@ def _needed(agent: Any) -> set[str]:
     if inner is not None:
         shown |= _needed(inner)
     return shown - set(OwnObservations._fields)
-
-
-def _no_memory(agent: Any) -> Any:
-    """Memory of an autopilot that is switched on."""
-    if not isinstance(agent, Controller):
-        return None
-    nothing = np.zeros((agent.memory_size, 1))
-    columns = iter(nothing)
-    return from_columns(agent.memory_record, columns)

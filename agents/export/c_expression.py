@@ -3,36 +3,27 @@
 import ast
 import builtins
 import inspect
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import FunctionType, ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from agents.export.c_library import (
-    function_name,
-    library_call,
-    table_entry,
-    variable_name,
-)
+from agents.export.c_library import FUNCTIONS, library_call, variable_name
 from agents.export.c_structures import Structures
 from agents.export.c_syntax import (
     NUMBERS,
     OPERATORS,
     Expression,
     Kind,
-    Level,
-    binary,
     c_name,
     choice,
+    joined,
     literal,
     members,
-    prefixed,
     stored_kind,
 )
-from agents.export.pruning import Constants
 from shipgym import InputError
 from shipgym.engine.records import is_record
 
@@ -58,8 +49,8 @@ class ExpressionWriter:
         Kinds of arguments and variables so far, by name.
     structures : Structures
     translate : callable
-        Writes a function that is called, for kinds of arguments; None if it is being
-        written already.
+        Writes a function that is called, for kinds of arguments; None while that one is
+        still being written.
     """
 
     place: str
@@ -77,17 +68,32 @@ class ExpressionWriter:
             " written as C"
         )
 
+    def constant(self, node: ast.AST) -> Any:
+        """Value of an expression of constants; None for any other."""
+        match node:
+            case ast.Constant():
+                return node.value
+            case ast.Name() if node.id not in self.kinds:
+                value = self.names.get(node.id)
+                return None if isinstance(value, type | FunctionType) else value
+            case ast.Attribute():
+                owner = self.constant(node.value)
+                return None if owner is None else getattr(owner, node.attr, None)
+            case ast.UnaryOp(op=ast.Not()):
+                operand = self.constant(node.operand)
+                return not operand if isinstance(operand, bool) else None
+        return None
+
     def expression(self, node: ast.expr) -> Expression:
         """An expression in C; InputError with its line if it cannot be written."""
-        known = Constants(self.names).value(node)
+        known = self.constant(node)
         if isinstance(known, bool | int | float | np.number):
-            kind = type(known)
-            text = literal(known.real, self.structures.real)
-            return Expression(text, kind if kind in NUMBERS else float)
+            kind = type(known) if type(known) in NUMBERS else float
+            return Expression(literal(known.real), kind)
 
         match node:
-            case ast.Name():
-                return self._variable(node)
+            case ast.Name() if node.id in self.kinds:
+                return Expression(variable_name(node.id), self.kinds[node.id])
             case ast.Attribute():
                 return self._member(node)
             case ast.BinOp(op=ast.BitAnd() | ast.BitOr()):
@@ -96,31 +102,25 @@ class ExpressionWriter:
                 return self._logic(node, node.op, node.values)
             case ast.BinOp(op=ast.Pow()):
                 return self._power(node)
-            case ast.BinOp():
-                return self._arithmetic(node)
-            case ast.UnaryOp():
-                return self._signed(node)
+            case ast.BinOp() if type(node.op) in OPERATORS:
+                sides = [self.expression(node.left), self.expression(node.right)]
+                return joined([as_real(side) for side in sides], node.op, float)
+            case ast.UnaryOp(op=ast.USub()):
+                operand = self.expression(node.operand)
+                return Expression(f"-{operand.operand}", operand.kind, is_atom=False)
+            case ast.UnaryOp(op=ast.Not()):
+                operand = self.expression(node.operand)
+                return Expression(f"!{operand.operand}", bool, is_atom=False)
             case ast.Compare():
                 return self._comparison(node)
             case ast.IfExp():
-                test = self.expression(node.test)
-                yes = self.expression(node.body)
-                no = self.expression(node.orelse)
-                return choice(test, yes, no)
+                parts = (node.test, node.body, node.orelse)
+                return choice(*[self.expression(part) for part in parts])
             case ast.Tuple():
-                return self._structure(self._expressions(node.elts))
+                return self._structure([self.expression(one) for one in node.elts])
             case ast.Call():
                 return self._call(node)
         raise self.refusal(node)
-
-    def _expressions(self, nodes: Iterable[ast.expr]) -> list[Expression]:
-        return [self.expression(node) for node in nodes]
-
-    def _variable(self, node: ast.Name) -> Expression:
-        name = node.id
-        if name not in self.kinds:
-            raise self.refusal(node)
-        return Expression(variable_name(name), self.kinds[name])
 
     def _member(self, node: ast.Attribute) -> Expression:
         record = self.expression(node.value)
@@ -128,152 +128,95 @@ class ExpressionWriter:
         name = c_name(node.attr)
         if name not in kinds:
             raise self.refusal(node)
-        owner = record.within(Level.ATOM)
         member = self.structures.label(record.kind, name).name
-        return Expression(f"{owner}.{member}", kinds[name])
-
-    def _arithmetic(self, node: ast.BinOp) -> Expression:
-        operator = OPERATORS.get(type(node.op))
-        if operator is None:
-            raise self.refusal(node)
-        left = self.expression(node.left)
-        right = self.expression(node.right)
-        return binary(
-            self.as_real(left),
-            operator,
-            self.as_real(right),
-            kind=float,
-        )
-
-    def as_real(self, number: Expression) -> Expression:
-        """An integer as a real number; other expressions as they are."""
-        if number.kind is not int:
-            return number
-        real = self.structures.real
-        if number.text.isdigit():
-            return Expression(literal(float(number.text), real), float)
-        return Expression(f"({real})({number.text})", float, Level.SIGN)
+        return Expression(f"{record.operand}.{member}", kinds[name])
 
     def _power(self, node: ast.BinOp) -> Expression:
+        known = self.constant(node.right)
+        is_whole = isinstance(known, int) and known > 0
+        function = "whole_power" if is_whole else "pow"
         base = self.expression(node.left).text
         exponent = self.expression(node.right).text
-        known = Constants(self.names).value(node.right)
-        is_whole = isinstance(known, int) and known > 0
-        power = function_name(math.pow, self.structures.real)
-        function = "whole_power" if is_whole else power
         return Expression(f"{function}({base}, {exponent})", float)
 
-    def _signed(self, node: ast.UnaryOp) -> Expression:
-        operand = self.expression(node.operand)
-        match node.op:
-            case ast.USub():
-                return prefixed("-", operand, operand.kind)
-            case ast.Not():
-                return prefixed("!", operand, bool)
-        raise self.refusal(node)
-
     def _comparison(self, node: ast.Compare) -> Expression:
-        left = self.expression(node.left)
+        operands = [self.expression(one) for one in [node.left, *node.comparators]]
         pairs = []
-        for op, comparator in zip(node.ops, node.comparators, strict=True):
-            operator = OPERATORS.get(type(op))
-            if operator is None:
+        for place, operator in enumerate(node.ops):
+            if type(operator) not in OPERATORS:
                 raise self.refusal(node)
-            right = self.expression(comparator)
-            pairs.append(binary(left, operator, right, bool))
-            left = right
-        if len(pairs) == 1:
-            return pairs[0]
-        text = " && ".join([pair.within(Level.SIGN) for pair in pairs])
-        return Expression(text, bool, Level.LOGIC)
+            pairs.append(joined(operands[place : place + 2], operator, bool))
+        return pairs[0] if len(pairs) == 1 else joined(pairs, ast.And(), bool)
 
     def _logic(
-        self, node: ast.expr, op: ast.AST, values: Sequence[ast.expr]
+        self, node: ast.expr, operator: ast.AST, values: Sequence[ast.expr]
     ) -> Expression:
         """`and`, `or`, and `&`, `|` of booleans."""
-        texts = []
-        for operand in self._expressions(values):
-            if operand.kind is not bool:
-                raise self.refusal(node)
-            texts.append(operand.within(Level.SIGN))
-        operator = OPERATORS[type(op)]
-        text = f" {operator.sign} ".join(texts)
-        return Expression(text, bool, operator.level)
+        operands = [self.expression(value) for value in values]
+        if any(operand.kind is not bool for operand in operands):
+            raise self.refusal(node)
+        return joined(operands, operator, bool)
 
     def _structure(
         self, values: Sequence[Expression], record: Kind = None
     ) -> Expression:
         """A structure of given values, a tuple where no record is named."""
-        kind = record
-        if record is None:
-            kind = tuple(stored_kind(value.kind) for value in values)
-        type_name = self.structures.type(kind)
+        kind = record or tuple(stored_kind(value.kind) for value in values)
         fields = []
         for name, value in zip(members(kind), values, strict=True):
             fields.append(f".{name} = {value.text}")
         inside = ", ".join(fields) or "0"
-        text = f"({type_name}){{{inside}}}"
-        return Expression(text, kind)
+        return Expression(f"({self.structures.type(kind)}){{{inside}}}", kind)
 
     # Calls.
 
     def _call(self, node: ast.Call) -> Expression:
         if isinstance(node.func, ast.Attribute) and node.func.attr == "_replace":
-            record = self.expression(node.func.value)
-            return self._replaced(node, record)
+            return self._replaced(node, self.expression(node.func.value))
 
         function = self._callee(node.func)
         if is_record(function):
-            fields = self._arguments(node, function)
-            return self._structure(fields, function)
-        real = self.structures.real
-        in_library = function_name(function, real) is not None
-        if isinstance(function, FunctionType) and not in_library:
+            return self._structure(self._arguments(node, function), function)
+        if isinstance(function, FunctionType) and function not in FUNCTIONS:
             return self._function_call(node, function)
 
-        call = library_call(function, self._expressions(node.args), real)
+        arguments = [self.expression(argument) for argument in node.args]
+        call = library_call(function, arguments)
         if call is None:
             raise self.refusal(node)
         return call
 
     def _callee(self, node: ast.expr) -> Any:
         """Object that is called, found where Python would find it."""
-        callee = None
         match node:
-            case ast.Name(id=name) if isinstance(self.kinds.get(name), FunctionType):
-                callee = self.kinds[name]
+            case ast.Name(id=name) if name in self.kinds:
+                return self.kinds[name]
             case ast.Name(id=name):
-                callee = self.names.get(name, getattr(builtins, name, None))
+                return self.names.get(name, getattr(builtins, name, None))
             case ast.Attribute(value=owner, attr=name):
-                module = Constants(self.names).value(owner)
+                module = self.constant(owner)
                 if isinstance(module, ModuleType):
-                    callee = getattr(module, name, None)
-        return callee
+                    return getattr(module, name, None)
+        return None
 
     def _arguments(self, node: ast.Call, function: Any) -> list[Expression]:
         """Arguments of a call in the order of the parameters, defaults among them."""
         named = {str(one.arg): one.value for one in node.keywords}
-        signature = inspect.signature(function)
         try:
-            bound = signature.bind(*node.args, **named)
+            bound = inspect.signature(function).bind(*node.args, **named)
         except TypeError:
             raise self.refusal(node) from None
         bound.apply_defaults()
 
         arguments = []
         for value in bound.arguments.values():
-            argument = value
-            if not isinstance(value, ast.expr):  # a default
-                argument = ast.Constant(value)
-            arguments.append(self._argument(argument))
+            is_given = isinstance(value, ast.expr)
+            arguments.append(self._argument(value if is_given else ast.Constant(value)))
         return arguments
 
     def _argument(self, node: ast.expr) -> Expression:
         """An argument; a function has no text."""
-        if not isinstance(node, ast.Name):
-            return self.expression(node)
-        name = node.id
-        function = self.kinds.get(name, self.names.get(name))
+        function = self._callee(node) if isinstance(node, ast.Name) else None
         if isinstance(function, FunctionType):
             return Expression("", function)
         return self.expression(node)
@@ -281,27 +224,33 @@ class ExpressionWriter:
     def _function_call(self, node: ast.Call, function: FunctionType) -> Expression:
         arguments = self._arguments(node, function)
         if function.__name__ == "row_of":  # of `shipgym.engine.records`
-            return table_entry(*arguments)
-        kinds = [argument.kind for argument in arguments]
-        called = self.translate(function, *kinds)
+            table, row = arguments
+            return Expression(f"{table.operand}[(int)({row.text})]", float)
+        called = self.translate(function, *[argument.kind for argument in arguments])
         if called is None:  # it calls itself
             raise self.refusal(node)
-        texts = [argument.text for argument in arguments if argument.text]
-        inside = ", ".join(texts)
+        inside = ", ".join([argument.text for argument in arguments if argument.text])
         return Expression(f"{called.name}({inside})", called.returns)
 
     def _replaced(self, node: ast.Call, record: Expression) -> Expression:
         """`record._replace(name=value)`, of a variable."""
         if not is_record(record.kind) or node.args:
             raise self.refusal(node)
-        owner = record.within(Level.ATOM)
         values = {}
         for name, kind in members(record.kind).items():
-            values[name] = Expression(f"{owner}.{name}", kind)
-
+            values[name] = Expression(f"{record.operand}.{name}", kind)
         for keyword in node.keywords:
             name = c_name(str(keyword.arg))
             if name not in values:
                 raise self.refusal(node)
             values[name] = self.expression(keyword.value)
         return self._structure(list(values.values()), record.kind)
+
+
+def as_real(number: Expression) -> Expression:
+    """An integer as a real number; other expressions as they are."""
+    if number.kind is not int:
+        return number
+    if number.text.isdigit():
+        return Expression(literal(float(number.text)), float)
+    return Expression(f"(double)({number.text})", float, is_atom=False)

@@ -1,16 +1,29 @@
 """Structures of C for records and tuples, and initialisers of constants."""
 
+import inspect
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from agents.export.c_syntax import NUMBERS, Kind, comment, literal, members
-from agents.export.field_notes import Label, field_notes
-from agents.export.units_text import unit_of
 from shipgym.engine.records import field_types, is_record, is_table, table_of
+
+
+class Label(NamedTuple):
+    """Name of a number in C, and what it is: unit first, then the meaning."""
+
+    name: str
+    note: str = ""
+
+    @property
+    def after_name(self) -> str:
+        """Its note as a comment behind the name."""
+        return f" /* {comment(self.note)} */" if self.note else ""
 
 
 @dataclass
@@ -20,8 +33,6 @@ class Structures:
     Attributes
     ----------
     prefix : str
-    real : str
-        Type of C for numbers, double or float.
     types : dict
         Names of structures by record or tuple of kinds; those that are given are
         declared elsewhere.
@@ -32,14 +43,13 @@ class Structures:
     """
 
     prefix: str
-    real: str = "double"
     types: dict[Kind, str] = field(default_factory=dict)
     texts: list[str] = field(default_factory=list)
     labels: dict[Kind, Mapping[str, Label]] = field(default_factory=dict)
     taken: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        public = (
+        public = [
             "init",
             "step",
             "step_with",
@@ -47,20 +57,18 @@ class Structures:
             "state",
             "input",
             "parameters",
-        )
-        for ending in public:
-            self.taken.add(f"{self.prefix}_{ending}")
+        ]
+        self.taken |= {f"{self.prefix}_{ending}" for ending in public}
 
     def type(self, kind: Kind) -> str:
         """C type of a kind; a structure is written when it is first needed."""
         if kind in NUMBERS:
-            return self.real if kind is float else NUMBERS[kind]
+            return NUMBERS[kind]
         if is_table(kind):
-            return f"const {self.real} *"
+            return "const double *"
         if kind not in self.types:
             base = kind.__name__ if is_record(kind) else f"Tuple{len(kind)}"
-            name = self.free_name(base)
-            self.declare(kind, name)
+            self.declare(kind, self.free_name(base))
         return self.types[kind]
 
     def declare(self, kind: Kind, name: str) -> None:
@@ -68,12 +76,9 @@ class Structures:
         declared = []
         for member, member_kind in members(kind).items():
             label = self.label(kind, member)
-            note = f" /* {comment(label.note)} */" if label.note else ""
-            declared.append(f"{self.type(member_kind)} {label.name};{note}")
-        if not declared:
-            declared.append("int nothing;")  # C has no structure without members
-
-        inside = "\n    ".join(declared)
+            declared.append(f"{self.type(member_kind)} {label.name};{label.after_name}")
+        # C has no structure without members
+        inside = "\n    ".join(declared or ["int nothing;"])
         self.types[kind] = name
         self.texts.append(f"typedef struct {{\n    {inside}\n}} {name};\n")
 
@@ -81,8 +86,7 @@ class Structures:
         """Name of a member in C, and a note on what it is."""
         if kind in self.labels:
             return self.labels[kind][member]
-        note = field_notes(kind).get(member, "")
-        return Label(member, note)
+        return Label(member, field_notes(kind).get(member, ""))
 
     def constant_label(self, kind: Kind, member: str) -> Label:
         """Name and note of a member of a constant.
@@ -93,7 +97,7 @@ class Structures:
         label = self.label(kind, member)
         is_coefficient = kind not in self.labels and is_record(kind)
         if is_coefficient and field_types(kind).get(member) is Any:
-            return label._replace(note="")
+            return Label(label.name)
         return label
 
     def initialiser(
@@ -105,29 +109,26 @@ class Structures:
     ) -> str:
         """Initialiser by numbers in order, one line each; tables become arrays."""
         if kind in NUMBERS:
-            return literal(next(numbers), self.real)
+            return literal(next(numbers))
         if is_table(kind):
-            return self._array(kind.rows, numbers, name)
+            return self._array(
+                [literal(one) for one in islice(numbers, kind.rows)], name
+            )
 
         deeper = f"{indent}    "
         lines = []
         for member, member_kind in members(kind).items():
             label = self.constant_label(kind, member)
             value = self.initialiser(member_kind, numbers, label.name, deeper)
-            note = f" /* {comment(label.note)} */" if label.note else ""
-            lines.append(f"{deeper}.{label.name} = {value},{note}\n")
+            lines.append(f"{deeper}.{label.name} = {value},{label.after_name}\n")
         inside = "".join(lines) or f"{deeper}0\n"
         return f"{{\n{inside}{indent}}}"
 
-    def _array(self, rows: int, numbers: Iterator[float], name: str) -> str:
+    def _array(self, literals: list[str], name: str) -> str:
         """Declare an array and return its name."""
         array = self.free_name(name)
-        literals = []
-        for number in islice(numbers, rows):
-            literals.append(literal(number, self.real))
-
         inside = ",\n    ".join(literals)
-        head = f"static const {self.real} {array}[{rows}]"
+        head = f"static const double {array}[{len(literals)}]"
         self.texts.append(f"{head} = {{\n    {inside},\n}};\n")
         return array
 
@@ -142,52 +143,54 @@ class Structures:
         self.taken.add(free)
         return free
 
+    def parameters(
+        self, kind: Kind, numbers: Iterator[float], before: str = ""
+    ) -> list["Parameter"]:
+        """Numbers of a constant that may be set; those of tables are left out."""
+        found = []
+        for member, part in members(kind).items():
+            label = self.constant_label(kind, member)
+            path = f"{before}{label.name}"
+            if is_table(part):
+                _ = list(islice(numbers, part.rows))
+            elif part in NUMBERS:
+                found.append(Parameter(path, next(numbers), label.note))
+            else:
+                found += self.parameters(part, numbers, f"{path}.")
+        return found
 
-@dataclass(frozen=True)
-class Parameter:
-    """A number of a constant that may be set.
 
-    Attributes
-    ----------
-    path : str
-        Where it is in the structure, such as `law.gains.sway`.
-    unit : str
-        Empty if its note begins with none.
-    """
+class Parameter(NamedTuple):
+    """A number of a constant that may be set."""
 
-    path: str
+    path: str  # where it is in the structure, such as `law.gains.sway`
     value: float
     note: str
-    unit: str
-
-    @property
-    def is_limit(self) -> bool:
-        """True for what bounds a magnitude, which may not be negative."""
-        name = self.path.rpartition(".")[2]
-        return name in ("limit", "reach", "rudder_limit", "rudder_rate")
 
 
-def parameters_of(
-    structures: Structures, kind: Kind, numbers: Iterator[float], before: str = ""
-) -> list[Parameter]:
-    """Numbers of a constant with their paths; those of tables are left out."""
-    found = []
-    for member, part in members(kind).items():
-        label = structures.constant_label(kind, member)
-        path = f"{before}{label.name}"
-        if is_table(part):
-            _ = list(islice(numbers, part.rows))
-        elif part in NUMBERS:
-            parameter = Parameter(
-                path=path,
-                value=next(numbers),
-                note=label.note,
-                unit=unit_of(label.note),
-            )
-            found.append(parameter)
-        else:
-            found += parameters_of(structures, part, numbers, f"{path}.")
-    return found
+@cache
+def field_notes(record: Any) -> dict[str, str]:
+    """Comments by the fields of a record: those beside a field, or on lines before it.
+
+    Empty for a record whose definition is not at hand.
+    """
+    try:
+        source = inspect.getsource(getattr(record, "noted", record))
+    except (OSError, TypeError):
+        return {}
+
+    notes = {}
+    before: list[str] = []
+    for line in source.splitlines():
+        code, _, beside = line.partition("# ")
+        name = re.match(r"    (\w+): ", code)
+        if name is None:
+            is_comment = beside and not code.strip()
+            before = [*before, beside] if is_comment else []
+            continue
+        notes[name[1]] = (beside or " ".join(before)).strip()
+        before = []
+    return notes
 
 
 def kind_of(value: Any) -> Kind:
@@ -197,12 +200,10 @@ def kind_of(value: Any) -> Kind:
     if not isinstance(value, tuple):
         return float
     record: Any = type(value)
-    kinds = {}
-    for name, part in zip(record._fields, value, strict=True):
-        kinds[name] = kind_of(part)
-    # a field that may be anything is a number
-    known = [float if kind is Any else kind for kind in field_types(record).values()]
-    if list(kinds.values()) == known:
+    kinds = {
+        name: kind_of(part) for name, part in zip(record._fields, value, strict=True)
+    }
+    if list(kinds.values()) == list(members(record).values()):
         return record
     return record_kind(record.__name__, kinds, noted=record)
 
@@ -220,12 +221,10 @@ def leaf_paths(kind: Kind, before: str = "", tables: bool = False) -> list[str]:
     paths = []
     for name, part in members(kind).items():
         path = f"{before}{name}"
-        is_wanted = is_table(part) if tables else part in NUMBERS
-        if is_wanted:
+        if is_record(part):
+            paths += leaf_paths(part, f"{path}.", tables)
+        elif is_table(part) == tables:
             paths.append(path)
-        elif is_record(part):
-            deeper = leaf_paths(part, f"{path}.", tables)
-            paths += deeper
     return paths
 
 

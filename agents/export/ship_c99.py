@@ -1,30 +1,58 @@
 """Ship models as C99, translated from the functions that the environments compile."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from agents.controllers.interface import model_hash
-from agents.export.c99 import Source, c_source, checked_name, render
-from agents.export.c_structures import (
-    Parameter,
-    leaf_paths,
-    parameters_of,
-    record_kind,
-)
+from agents.export.c_structures import Label, Parameter, leaf_paths, record_kind
 from agents.export.c_syntax import comment
-from agents.export.term_labels import coefficient_labels
+from agents.export.source import (
+    Source,
+    Variable,
+    Variables,
+    c_source,
+    checked_name,
+    render,
+)
 from agents.export.translator import Translator
-from agents.export.variables import SHIP_INPUTS, SHIP_STATES, Variables
 from shipgym import InputError, ShipModel, Weather, Wind
 from shipgym.arrays import Floats
 from shipgym.engine.mathematics import sin_cos
 from shipgym.engine.motion import Motion, Push, Ship, lost, sail
-from shipgym.engine.records import flat, leaves
+from shipgym.engine.records import Record, field_types, flat, leaves
 from shipgym.models.simulate import LONGEST_STEP
 from shipgym.sea.open_sea import OPEN_SEA, Sea, SeaParameters, push
 from shipgym.sea.weather_column import CALM, weather_column
+from shipgym.ships.grey_boxes import GreyBox
+from shipgym.ships.term_functions import speed_power
+
+#: Given to an exported ship, held over a step.
+SHIP_INPUTS: Variables = {
+    "rudder": Variable("rad", "rudder order, to starboard positive"),
+    "shaft": Variable("1/s", "ordered shaft speed"),
+    "current_north": Variable("m/s", "current"),
+    "current_east": Variable("m/s", "current"),
+    "wind_speed": Variable("m/s", "10 m above the sea; 0: no wind forces"),
+    "wind_from": Variable("rad", "direction the wind comes from"),
+}
+
+#: State of an exported ship, with the fields of `Motion`.
+SHIP_STATES: Variables = {
+    "x": Variable("m", "north"),
+    "y": Variable("m", "east"),
+    "psi": Variable("rad", "heading"),
+    "u": Variable("m/s", "surge"),
+    "v": Variable("m/s", "sway"),
+    "r": Variable("rad/s", "yaw rate"),
+    "p": Variable("rad/s", "roll rate"),
+    "phi": Variable("rad", "heel"),
+    "q": Variable("rad/s2", "memory of yaw"),
+    "delta": Variable("rad", "rudder angle"),
+    "n": Variable("1/s", "shaft speed"),
+}
 
 
 class ShipInput(NamedTuple):
@@ -79,14 +107,13 @@ def ship_source(
     model: ShipModel,
     name: str | None = None,
     water_depth: float = np.inf,
-    real: str = "double",
 ) -> Source:
     """Write a ship model as C99, by default under the model's name.
 
-    `water_depth`: m; `real`: type of her numbers, double or float. A ship with too few
-    particulars for wind forces is written without them, as `Source.notes` says. Raises
-    InputError for a name that C does not take, shallow water that the model does not
-    know, and equations of one's own that use more than arithmetic.
+    `water_depth`: m. A ship with too few particulars for wind forces is written without
+    them, as `Source.notes` says. Raises InputError for a name that C does not take,
+    shallow water that the model does not know, and equations of one's own that use more
+    than arithmetic.
     """
     name = checked_name(name or model.name)
     longest = LONGEST_STEP * model.travel_time
@@ -94,7 +121,7 @@ def ship_source(
     numbers = [*model.ship_numbers(water_depth, longest), *weather]
     inputs = _inputs(model, windy=not note)
     outputs = _outputs(model)
-    c = Translator({**model.compiled.hooks(), **OPEN_SEA.functions}, name, real)
+    c = Translator({**model.compiled.hooks(), **OPEN_SEA.functions}, name)
     c.structures.labels |= coefficient_labels(model)
     kind = record_kind(
         "Parameters",
@@ -120,8 +147,8 @@ def ship_source(
     }
     return Source(
         name=name,
-        header=render("ship.h.j2", name, real=real, **data),
-        source=c_source("ship.c.j2", name, real, **data),
+        header=render("ship.h.j2", name, **data),
+        source=c_source("ship.c.j2", name, **data),
         inputs=inputs,
         outputs=outputs,
         step=longest,
@@ -143,7 +170,7 @@ def _tunable(
         gear.add("ship.gear_frequency")
 
     kept = []
-    for parameter in parameters_of(c.structures, kind, iter(numbers)):
+    for parameter in c.structures.parameters(kind, iter(numbers)):
         path = parameter.path
         of_hull = path.startswith("coefficients.")
         has_effect = of_hull or path in gear
@@ -237,3 +264,37 @@ def _started(model: ShipModel, names: set[str], variables: Variables) -> Variabl
             value = start.get(name, 0.0)
             started[name] = variable._replace(start=value)
     return started
+
+
+def coefficient_labels(model: ShipModel) -> dict[Record, Mapping[str, Label]]:
+    """Names of the numbered coefficients of a ship's terms, and of her reference's."""
+    dynamics: Any = model.dynamics
+    record = model.compiled.coefficients
+    labels: dict[Record, Mapping[str, Label]] = {}
+    if isinstance(dynamics, GreyBox):
+        reference: Any = dynamics.ship
+        labels |= coefficient_labels(reference)
+        record = field_types(record)["terms"]
+
+    numbered = getattr(record, "_fields", ())
+    if numbered and all(re.fullmatch(r"c\d+", name) for name in numbered):
+        labels[record] = dict(zip(numbered, _term_labels(dynamics), strict=True))
+    return labels
+
+
+def _term_labels(dynamics: Any) -> list[Label]:
+    """Labels of the terms of a table's equations, in order: `vdot_abs_v_r`."""
+    labels: dict[str, Label] = {}
+    for equation, terms in dynamics.equations.items():
+        for term in terms:
+            letters = re.sub(r"\|(\w+)\|", r"abs_\1_", term.name)
+            letters = re.sub(r"\W", "_", letters, flags=re.ASCII).strip("_")
+            name = f"{equation}dot_{letters[:30]}"
+            while name in labels:
+                name += "_"
+            power = 0
+            if dynamics.normalisation == "prime":
+                power = speed_power(equation, term)
+            product = f"{term.name} U^{power}" if power else term.name
+            labels[name] = Label(name, f"of {product} in the rate of {equation}")
+    return list(labels.values())

@@ -31,11 +31,10 @@ from agents.cli import app
 from agents.controllers.guided import TURNS, bend
 from agents.controllers.law import Turns
 from agents.controllers.quiet_lq import QuietLQ
-from agents.export.autopilot import Autopilot, BridgeInput
+from agents.export.autopilot import AUTOPILOT_INPUTS, BridgeInput
 from agents.export.autopilot_c99 import autopilot_source
-from agents.export.c99 import checked_name
 from agents.export.ship_c99 import ShipInput, advance, ship_source
-from agents.export.variables import AUTOPILOT_INPUTS
+from agents.export.source import checked_name
 from shipgym.engine.motion import Motion
 from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError
@@ -45,28 +44,25 @@ from shipgym.sea.open_sea import OPEN_SEA
 from shipgym.sea.weather_column import CALM
 from shipgym.ships.kernel_boxes import Kernel, kernel_box
 from shipgym.tasks.task import path_following_task
+from tests.agents.bridge import Bridge
 from tests.agents.compiling import built
 from tests.agents.policies import MARINER, random_network, random_policy
 
 DOCS = Path(__file__).parents[2] / "docs"
 #: What no sensor gives.
 NO_MEASUREMENTS = (np.nan, np.inf, -np.inf, 1e30)
-NUMBERS = {
-    "double": (np.float64, ctypes.c_double),
-    "float": (np.float32, ctypes.c_float),
-}
 
 
-def sailed(folder, model, commands, given, dt, real="double"):
+def sailed(folder, model, commands, given, dt):
     """States of the exported ship, shape (n + 1, 11).
 
     Now and then an order that is no number is refused and changes nothing.
     """
-    source = ship_source(model, "ship", real=real)
+    source = ship_source(model, "ship")
     library = built(folder, "ship", source.header, source.source)
-    kind, number = NUMBERS[real]
-    library.ship_step.argtypes = [ctypes.c_void_p, ctypes.c_void_p, number]
-    state, inputs, states = np.zeros(11, kind), np.zeros(6, kind), []
+    pointer = ctypes.c_void_p
+    library.ship_step.argtypes = [pointer, pointer, ctypes.c_double]
+    state, inputs, states = np.zeros(11), np.zeros(6), []
     library.ship_init(ctypes.c_void_p(state.ctypes.data))
     inputs[1:] = model.service_shaft_speed, *given
     for step, rudder in enumerate(commands):
@@ -83,7 +79,7 @@ def sailed(folder, model, commands, given, dt, real="double"):
                 assert again == HELD
             assert np.array_equal(state, states[-1])
         assert library.ship_step(state.ctypes.data, inputs.ctypes.data, dt) == 0
-    return np.array([*states, state], dtype=float)
+    return np.array([*states, state])
 
 
 HELD = 2  # status of a ship's step that was not taken
@@ -262,20 +258,19 @@ SIZES = {
 }
 
 
-def orders(agent, name, folder, steps, real="double"):
+def orders(agent, name, folder, steps):
     """Orders of an autopilot in C and in the library, for the same random numbers.
 
     A tenth of the measurements has an input that is none: C repeats the last order and
     says so, and goes on as the library does, which has not been given them.
     """
-    source, bridge = autopilot_source(agent, name, real), Autopilot(agent)
-    kind, number = NUMBERS[real]
+    source, bridge = autopilot_source(agent, name), Bridge(agent)
     head = f"int status_of(const {name}_state *state)"
     more = f"{head};\n{head} {{ return state->status; }}\n"
     library = built(folder, name, source.header, source.source + more)
     state = ctypes.create_string_buffer(10_000)
     step = getattr(library, f"{name}_step")
-    step.restype, step.argtypes = number, [ctypes.c_void_p, ctypes.c_void_p]
+    step.restype, step.argtypes = ctypes.c_double, [ctypes.c_void_p, ctypes.c_void_p]
     getattr(library, f"{name}_init")(state)
 
     names = list(source.inputs)
@@ -293,7 +288,7 @@ def orders(agent, name, folder, steps, real="double"):
             here.append(here[-1])
         else:
             here.append(bridge.step(dict(zip(names, row.tolist(), strict=True))))
-        in_c.append(step(state, row.astype(kind).ctypes.data))
+        in_c.append(step(state, row.ctypes.data))
         assert library.status_of(state) == wrong
     return np.array(in_c), np.array(here[1:])
 
@@ -320,28 +315,6 @@ def test_a_policy_in_c_orders_what_the_library_orders_in_single_precision(
     np.testing.assert_allclose(in_c, here, rtol=0.0, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["lq", "lqg", "turn_rate", "wheel_over", "residual"])
-def test_an_autopilot_of_floats_orders_the_same_within_their_digits(name, tmp_path):
-    agents = HEADING | GUIDANCE | LEARNED
-    in_c, here = orders(agents[name], name, tmp_path, 500, real="float")
-    np.testing.assert_allclose(in_c, here, rtol=0.0, atol=2e-5)
-
-
-@pytest.mark.parametrize("name", ["mariner", "kvlcc2-rm-svm"])
-def test_a_ship_of_floats_sails_the_same_within_their_digits(name, tmp_path):
-    """In ten minutes of turning circles, within 1e-4 of the largest of each state."""
-    model = load_model(name)
-    rudder = np.radians(15.0) * np.sign(np.sin(0.02 * np.arange(600) + 0.001))
-    given = (0.5, 0.2, 0.0, 0.0)
-    found = {}
-    for real in NUMBERS:
-        (tmp_path / real).mkdir()
-        found[real] = sailed(tmp_path / real, model, rudder, given, 1.0, real)
-    sizes = np.abs(found["double"]).max(axis=0)
-    error = np.abs(found["float"] - found["double"]).max(axis=0)
-    assert (error <= 1e-4 * np.maximum(sizes, 1e-3)).all(), error / sizes
-
-
 @pytest.mark.parametrize(
     "agent", [HEADING["lq"], HEADING["lqg"], LEARNED["ppo"]], ids=["lq", "lqg", "ppo"]
 )
@@ -349,7 +322,7 @@ def test_an_autopilot_orders_what_the_controller_commands_in_the_environment(age
     env = gym.make("shipgym/CourseKeeping-v0", model="mariner")
     seen, _ = env.reset(seed=3)
     names, scales = env.unwrapped.observation_names, env.unwrapped.observation_scales
-    bridge, state = Autopilot(agent), None
+    bridge, state = Bridge(agent), None
     for step in range(60):
         physical = dict(zip(names, seen * scales, strict=True))
         error = np.arctan2(seen[0], seen[1])
@@ -369,7 +342,7 @@ def test_guidance_orders_what_it_commands_along_a_path(kind):
     seen, _ = env.reset(seed=3)
     names, scales = env.unwrapped.observation_names, env.unwrapped.observation_scales
     half, radius = 0.5 * agent.gains["task_lookahead"], agent.gains.get("path_radius")
-    bridge, state = Autopilot(agent), None
+    bridge, state = Bridge(agent), None
     for step in range(60 if kind is MPC else 250):
         told = dict(zip(names, seen.astype(float) * scales, strict=True))
         shown = np.arctan2(seen[0], seen[1])  # the ship heading to the north
@@ -510,14 +483,6 @@ def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
             tmp_path / "no.zip",
         ),
         (
-            "--fmi: expected with --fmu, got 2.0",
-            "mariner",
-            "--c",
-            tmp_path / "no",
-            "--fmi",
-            "2.0",
-        ),
-        (
             "--depth: expected none for an autopilot, got 9",
             tmp_path / "pid.json",
             "--c",
@@ -543,9 +508,9 @@ def test_numbers_in_c_carry_their_names_units_and_limits():
 
     ship = ship_source(MARINER, "ship")
     assert re.search(
-        r"\.vdot_v = \(-0\..*, /\* 1/m, of v U in the rate of v \*/", ship.source
+        r"\.vdot_v = \(-0\..*, /\* of v U\^1 in the rate of v \*/", ship.source
     )
-    assert re.search(r"\.rdot_vvr = .*, /\* 1/m, of v\^2 r U\^-1 ", ship.source)
+    assert re.search(r"\.rdot_vvr = .*, /\* of vvr U\^-1 in ", ship.source)
     assert re.search(r"\.rudder_rate = 0\.087\d+, /\* rad/s \*/", ship.source)
     assert not re.search(r"\bc\.c\d+\b", ship.source)
     assert f'SHIP_MODEL_SHA256 "{agent.model_sha256}"' in ship.header
@@ -554,7 +519,7 @@ def test_numbers_in_c_carry_their_names_units_and_limits():
 
 
 def bridge_limit(agent):
-    return Autopilot(agent).limit
+    return Bridge(agent).limit
 
 
 def test_a_hash_that_is_none_does_not_become_c():

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, PreviewLQ, TurnRate, WheelOver
-from agents.export.autopilot import Autopilot
 from shipgym.tasks.task import Task
+from tests.agents.bridge import Bridge
 from tests.agents.policies import MARINER
 
 PAGE = (Path(__file__).parents[2] / "docs" / "deployment.md").read_text(
@@ -135,7 +135,7 @@ def turn_rate_by_hand(file, given, memory):
 
 def test_a_rate_of_turn_is_steered_as_the_page_says():
     agent, random, memory = TurnRate.from_model(MARINER), np.random.default_rng(0), None
-    file, bridge = json.loads(json.dumps(agent.to_dict())), Autopilot(agent)
+    file, bridge = json.loads(json.dumps(agent.to_dict())), Bridge(agent)
     for step in range(300):
         given = dict(
             zip(
@@ -154,7 +154,7 @@ def test_wheel_over_is_what_the_page_says():
         WheelOver.from_model(MARINER, task=Task.of("PathFollowing")),
         np.random.default_rng(1),
     )
-    bridge, gains, integral = Autopilot(agent), agent.gains, 0.0
+    bridge, gains, integral = Bridge(agent), agent.gains, 0.0
     helm = json.loads(json.dumps(agent.to_dict()))["autopilot"]
     sizes = {
         "surge": 1.0,
@@ -291,7 +291,7 @@ def weighed_course(given, gains):
 def test_lq_with_preview_is_what_the_page_says():
     agent = PreviewLQ.from_model(MARINER, task=Task.of("PathFollowing"))
     random = np.random.default_rng(1)
-    bridge, gains, integral = Autopilot(agent), agent.gains, 0.0
+    bridge, gains, integral = Bridge(agent), agent.gains, 0.0
     helm = json.loads(json.dumps(agent.to_dict()))["autopilot"]
     of, neutral, limit = helm["gains"], helm["neutral_rudder"], MARINER.steering.limit
     current = SeenCurrent(gains)

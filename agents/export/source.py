@@ -1,10 +1,10 @@
-"""C99 and XML made from templates."""
+"""Exported ships and autopilots: their C, made from templates, and their variables."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -12,8 +12,25 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 import shipgym
 from agents.export.c_structures import Parameter
 from agents.export.c_syntax import KEYWORDS, comment, literal
-from agents.export.variables import Variables
 from shipgym import InputError
+
+
+class Variable(NamedTuple):
+    """A number that an exported ship or autopilot takes or gives."""
+
+    unit: str
+    meaning: str
+    start: float = 0.0  # value at the beginning
+
+    @property
+    def largest(self) -> float:
+        """Largest magnitude that is taken; beyond it a number is no measurement."""
+        # far beyond ships, but small enough to compute with
+        by_unit = {"m": 1e8, "rad": 1e4, "m/s": 1e3, "rad/s": 1e2, "1/s": 1e4}
+        return by_unit[self.unit]
+
+
+Variables = Mapping[str, Variable]
 
 
 @dataclass(frozen=True)
@@ -71,27 +88,19 @@ def checked_name(name: str) -> str:
 
 def render(template: str, name: str = "", **data: Any) -> str:
     """A text made from one of the templates."""
-    return (
-        _environment()
-        .get_template(template)
-        .render(
-            **data,
-            name=name,
-            NAME=name.upper(),
-            version=shipgym.__version__,
-        )
-    )
+    made = _environment().get_template(template)
+    version = shipgym.__version__
+    return made.render(**data, name=name, NAME=name.upper(), version=version)
 
 
-def c_source(template: str, name: str, real: str = "double", **data: Any) -> str:
+def c_source(template: str, name: str, **data: Any) -> str:
     """Source in C made from a template, after the functions that it calls."""
-    body = render(template, name, real=real, **data)
-    return with_prelude(name, body, real)
+    return with_prelude(name, render(template, name, **data))
 
 
-def with_prelude(name: str, body: str, real: str = "double") -> str:
+def with_prelude(name: str, body: str) -> str:
     """Text of a source after the header and the functions of the prelude it calls."""
-    return render("prelude.c.j2", name, real=real, body=body)
+    return render("prelude.c.j2", name, body=body)
 
 
 def hash_text(sha256: str) -> str:
@@ -105,20 +114,13 @@ def _calls(text: str, function: str) -> bool:
     return re.search(rf"\b{function}\(", text) is not None
 
 
-def single(number: float) -> str:
-    """A number in single precision as C writes it."""
-    return f"{number:.9e}f"
-
-
-def array(numbers: Iterable[Any]) -> str:
+def single_precision(numbers: Iterable[Any]) -> str:
     """Numbers of an array in single precision as C initialises it."""
     entries = []
     for entry in numbers:
         is_number = np.ndim(entry) == 0
-        text = single(entry) if is_number else array(entry)
-        entries.append(text)
-    inside = ", ".join(entries)
-    return f"{{{inside}}}"
+        entries.append(f"{entry:.9e}f" if is_number else single_precision(entry))
+    return f"{{{', '.join(entries)}}}"
 
 
 @cache
@@ -132,7 +134,7 @@ def _environment() -> Environment:
     environment.filters |= {
         "c": literal,
         "comment": comment,
-        "floats": array,
+        "floats": single_precision,
     }
     environment.tests["calling"] = _calls
     return environment
