@@ -1,16 +1,15 @@
-"""Tests keep compiled ships in a folder of their own where the user's cache is refused
-or closed."""
+"""Compiled ships of tests lie in a folder of their own if the user's is closed."""
 
 import os
 import tempfile
 
 import pytest
 
-from shipgym.engine.cache_folder import CACHE_VARIABLE, open_folder
+from shipgym.engine.cache import CACHE_VARIABLE, cache_folder
 
 try:
-    open_folder()
-except (OSError, ValueError):
+    cache_folder().mkdir(parents=True, exist_ok=True)
+except OSError:
     os.environ[CACHE_VARIABLE] = tempfile.mkdtemp(prefix="shipgym-tests-")
 
 

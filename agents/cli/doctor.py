@@ -6,7 +6,6 @@ import os
 import platform
 import re
 import tempfile
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,12 +13,7 @@ from rich.text import Text
 
 import shipgym
 from agents.output import locks_and_drafts
-from shipgym.engine.cache_folder import (
-    CACHE_VARIABLE,
-    cache_folder,
-    loop_fault,
-    open_folder,
-)
+from shipgym.engine.cache import CACHE_VARIABLE, cache_folder
 
 #: Marks and colours of the states of a finding: it works; an optional package is not
 #: installed; something may be removed; something does not work.
@@ -113,50 +107,22 @@ def package_finding(
 
 
 def cache_finding() -> Finding:
-    """Place and size of the cache of compiled ships, and what is wrong with it."""
+    """Place and size of the cache of compiled ships, and whether it can be written."""
     folder = cache_folder()
-    content = ""
     try:
-        folder = open_folder()
+        folder.mkdir(parents=True, exist_ok=True)
         files = [path for path in folder.iterdir() if path.is_file()]
-        size = sum(path.stat().st_size for path in files) / 1e6
-        content = f"{folder}, {len(files)} files, {size:.1f} MB"
-        unusable = _unusable(files)
-        if unusable:
-            return Finding(
-                "cache",
-                "wrong",
-                f"{content}, {len(unusable)} of them not usable: {unusable[0]}; delete"
-                " what is not, or wait until it is compiled again",
-            )
-        with tempfile.NamedTemporaryFile(dir=folder):  # it can be written
+        with tempfile.NamedTemporaryFile(dir=folder):
             pass
-    except ValueError as error:
-        return Finding("cache", "wrong", str(error))
     except OSError as error:
-        is_readable = folder.is_dir() and os.access(folder, os.R_OK | os.X_OK)
-        if is_readable and any(folder.iterdir()):
-            detail = (
-                f"{content}, to be read only: what is missing is compiled in memory"
-            )
-            return Finding("cache", "fine", detail)
         return Finding(
             "cache",
             "wrong",
-            f"{folder} cannot be written ({error.strerror}): every process compiles its"
-            f" ships again; set {CACHE_VARIABLE} to a folder that can be",
+            f"{folder} cannot be written ({error.strerror}): what it lacks is compiled"
+            f" again in each process; set {CACHE_VARIABLE} to a folder that can be",
         )
-    return Finding("cache", "fine", content)
-
-
-def _unusable(files: Iterable[Path]) -> list[str]:
-    """Files of the cache that cannot be used, each with the reason."""
-    unusable = []
-    for path in files:
-        fault = loop_fault(path)
-        if fault:
-            unusable.append(f"{path.name} {fault}")
-    return unusable
+    size = sum(path.stat().st_size for path in files) / 1e6
+    return Finding("cache", "fine", f"{folder}, {len(files)} files, {size:.1f} MB")
 
 
 def left_findings() -> list[Finding]:

@@ -9,15 +9,12 @@ it is.
 
 import os
 import sys
-import uuid
-from functools import cache, partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from shipgym.engine.cache_folder import locked, usable_folder
-from shipgym.engine.fingerprint import fingerprint, traced
+from shipgym.engine.cache import cached_path, load, locked, save
+from shipgym.engine.fingerprint import fingerprint, process_name, traced
 from shipgym.engine.numba_errors import explanation
 from shipgym.engine.numba_import import load_numba
 from shipgym.engine.specialise import Hooks, Specialisation
@@ -61,24 +58,16 @@ def compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
         # words of random numbers overflow, as they do when compiled
         return np.errstate(over="ignore")(Specialisation(hooks).copy(loop))
 
-    from shipgym.engine.disk_cache import CachedLoop
-
-    tag = fingerprint(loop, hooks)
-    folder = usable_folder()
-    if folder is None:
-        announce(what, None)
+    path = cached_path(fingerprint(loop, hooks), signature)
+    if path is None:
         return _compiled(loop, signature, hooks, what)
-
-    cached = CachedLoop(folder, tag, signature)
-    if (found := cached.load(loop)) is not None:
+    if (found := load(loop, path)) is not None:
         return found
-    waiting = f"shipgym: another process compiles {what}; waiting for it"
-    with locked(cached.path, partial(tell_who_waits, waiting)):
-        if (found := cached.load(loop)) is not None:  # another process was first
+    with locked(path):
+        if (found := load(loop, path)) is not None:  # another process was first
             return found
-        announce(what, folder)
         made = _compiled(loop, signature, hooks, what)
-        cached.save(made)
+        save(made, path)
     return made
 
 
@@ -129,6 +118,8 @@ def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
     numba = load_numba()
     from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
+    # typical time of a loop on a laptop
+    tell_who_waits(f"shipgym: compiling {what}, once, about 7 s")
     specialised = _named(Compilation(hooks).copy(loop))
     try:
         return numba.njit(signature, nogil=True, **SEMANTICS)(specialised)
@@ -146,29 +137,9 @@ def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
 
 def _named(copy: Any) -> Any:
     """Name a copy so that symbols of all that is compiled differ."""
-    copy.__qualname__ = f"{copy.__name__}_{_process_name(os.getpid())}"
+    copy.__qualname__ = f"{copy.__name__}_{process_name(os.getpid())}"
     copy.__module__ = __name__  # imported with the machine code, as no user's file is
     return copy
-
-
-@cache
-def _process_name(process: int) -> str:
-    """Name of this process, part of the symbols that it compiles.
-
-    Loops from files of two processes, one of them forked from the other, thus define no
-    symbol of the same name; the code of one would be run in place of the other's.
-    """
-    return uuid.uuid4().hex
-
-
-def announce(what: str, folder: Path | None) -> None:
-    """Announce to a waiting user what is compiled, and where it is stored."""
-    kept = "kept in memory only"
-    if folder:
-        kept = f"kept in {folder}"
-    # typical compilation time of a loop on a laptop, for the announcement
-    seconds = 7
-    tell_who_waits(f"shipgym: compiling {what}, once, about {seconds} s; {kept}")
 
 
 def tell_who_waits(words: str) -> None:

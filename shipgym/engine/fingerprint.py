@@ -6,9 +6,10 @@ omit the middle of a long array, or everything but a name.
 """
 
 import hashlib
+import os
 import platform
+import uuid
 from collections.abc import Iterable
-from enum import EnumType
 from functools import cache
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
@@ -26,6 +27,8 @@ from shipgym.engine.specialise import (
     named_globals,
 )
 from shipgym.python_files import nested_code
+
+_UNKNOWN: dict[int, Any] = {}
 
 
 def fingerprint(function: Any, hooks: Hooks) -> str:
@@ -72,12 +75,14 @@ class _Trace:
             self.add((value.__name__, value._fields))
             self._visit_all(value._field_defaults.items())
             self.records.append(value)
-        elif isinstance(value, EnumType):
-            self.add((value.__qualname__, dict(value.__members__)))
-        elif isinstance(value, type) or callable(value):
-            self._visit_compiled(value)
-        else:
+        elif hasattr(value, "py_func"):  # of `numba.njit`
+            self.add((type(value).__name__, value.targetoptions))
+            self._visit_python(value.py_func)
+        elif _is_known(value):
             self.add(value)
+        else:  # nothing is known of its content: no other process finds it
+            _UNKNOWN[id(value)] = value  # so that no other value has its number
+            self.add((process_name(os.getpid()), id(value)))
 
     def _visit_all(
         self,
@@ -101,22 +106,6 @@ class _Trace:
             return
         named_globals(function, self.hooks)  # refuses variables of a function around it
         self._visit_python(function)
-
-    def _visit_compiled(self, value: Any) -> None:
-        """Add a function that Numba compiles, or knows by its name."""
-        value = getattr(value, "_dispatcher", value)  # of `numba.vectorize`
-        python = getattr(value, "py_func", None) or getattr(value, "_defn", None)
-        jitclass = getattr(value, "class_type", None)
-        if python is not None:  # of `numba.njit`, or an intrinsic
-            options = getattr(value, "targetoptions", None)
-            self.add((type(value).__name__, options))
-            self._visit_python(python)
-        elif jitclass is not None:
-            self.add(jitclass.struct)
-            self._visit_all(jitclass.jit_methods.values())
-            self._visit_all(jitclass.jit_static_methods.values())
-        else:
-            self.add(getattr(value, "__qualname__", str(type(value))))
 
     def _visit_python(self, function: Any) -> None:
         """Add bytecode, defaults and globals of a function."""
@@ -150,6 +139,22 @@ class _Trace:
         new = value not in self._numbers
         self.add(self._numbers.setdefault(value, len(self._numbers)))
         return new
+
+
+def _is_known(value: Any) -> bool:
+    """Return whether the text of a value says all that it is."""
+    module = getattr(value, "__module__", None) or type(value).__module__
+    return module.partition(".")[0] in ("builtins", "math", "numpy", "_operator")
+
+
+@cache
+def process_name(process: int) -> str:
+    """Name of a process, part of the symbols that it compiles.
+
+    Loops from files of two processes, one of them forked from the other, thus define no
+    symbol of the same name; the code of one would be run in place of the other's.
+    """
+    return uuid.uuid4().hex
 
 
 @cache

@@ -148,7 +148,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         state = self._take(options, "reset_mask") if mask.all() else None
         if state is not None:
             self.set_state(state)
-            return self._shown(self._engine.outputs.observations), self._infos()
+            return self._engine.outputs.observations, self._infos()
 
         engine = self._engine
         self._keys, episodes = self._next_episodes(seed, mask, episodes)

@@ -1,11 +1,8 @@
 """`shipgym doctor`: the installation, and the cache of compiled ships."""
 
-import errno
 import importlib.metadata
 import json
-import os
 import re
-import tempfile
 from pathlib import Path
 
 import pytest
@@ -35,34 +32,13 @@ def test_doctor_tells_of_a_cache_that_cannot_be_written(tmp_path, monkeypatch):
     monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path / "file" / "cache"))
     answer = shipgym("doctor")
     assert answer.exit_code == 1
-    assert "compiles its ships again" in answer.stdout
+    assert "is compiled again in each process" in answer.stdout.replace("\n", " ")
 
 
 def test_doctor_tells_place_and_size_of_the_cache(tmp_path, monkeypatch):
     (tmp_path / "it.loop").write_bytes(bytes(200_000))
     monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path))
     assert f"{tmp_path}, 1 files, 0.2 MB" in shipgym("doctor").stdout.replace("\n", "")
-
-
-def test_doctor_tells_of_a_cache_that_is_damaged_or_open_to_others(
-    tmp_path, monkeypatch
-):
-    (tmp_path / "it.loop").write_bytes(bytes(200))
-    monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path))
-    answer = shipgym("doctor", "--json")
-    (cache,) = (
-        one for one in json.loads(answer.stdout)["findings"] if one["what"] == "cache"
-    )
-    assert (answer.exit_code, cache["state"]) == (1, "wrong")
-    assert "1 of them not usable: it.loop is damaged" in cache["detail"]
-    if os.name != "nt":
-        tmp_path.chmod(0o777)
-        answer = shipgym("doctor", "--json")
-        assert answer.exit_code == 1
-        assert (
-            f"{tmp_path} may be written by other users; chmod go-w {tmp_path}, or set"
-            in answer.stdout
-        )
 
 
 @pytest.mark.parametrize(
@@ -72,23 +48,6 @@ def test_doctor_tells_of_a_cache_that_is_damaged_or_open_to_others(
 def test_doctor_has_a_mark_for_each_state(state, mark):
     line = doctor.Finding("cache", state, "and why").line().plain
     assert line.split() == [mark, "cache", "and", "why"]
-
-
-def test_a_cache_that_can_only_be_read_is_of_use_if_something_is_in_it(
-    tmp_path, monkeypatch
-):
-    def refused(**_):
-        raise OSError(errno.EROFS, "Read-only file system")
-
-    monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path))
-    monkeypatch.setattr(tempfile, "NamedTemporaryFile", refused)
-    empty = doctor.cache_finding()
-    assert empty.state == "wrong"
-    assert "cannot be written (Read-only file system)" in empty.detail
-    (tmp_path / "notes.txt").write_text("2" * 260_000)
-    filled = doctor.cache_finding()
-    assert filled.state == "fine"
-    assert f"{tmp_path}, 1 files, 0.3 MB, to be read only" in filled.detail
 
 
 def test_versions_of_packages_or_those_missing_are_named():

@@ -1,9 +1,7 @@
 """Compiled loops: the same numbers as plain Python, hooks filled, records where their
 rows are."""
 
-import inspect
 import os
-import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -13,23 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from numba import config, njit, types, vectorize
-from numba.experimental import jitclass
-from numba.extending import intrinsic
+from numba import config, njit, vectorize
 
 import shipgym
 from shipgym.engine.compiling import compiled
 from shipgym.engine.fingerprint import fingerprint
-from shipgym.engine.loops import LOOPS, ship_loop
-from shipgym.engine.numba_errors import explanation
+from shipgym.engine.loops import ship_loop
 from shipgym.engine.record_code import clipped_storer, loader, storer, summed, zeros
 from shipgym.engine.records import Layout, row_of, table_of
 from shipgym.engine.specialise import Specialisation, called, named_globals
 from shipgym.errors import InputError
-from shipgym.models.catalogue import kvlcc2, kvlcc2_l7
-from shipgym.sea.open_sea import CALM_SEA, OPEN_SEA
-from shipgym.ships.term_functions import accelerations_source
-from shipgym.ships.terms import Term
 
 SAIL = """
 import numpy as np, shipgym
@@ -84,27 +75,6 @@ def test_models_of_one_structure_share_what_is_compiled():
     assert ship_loop(container.compiled, "simulate") is ship_loop(
         changed.compiled, "simulate"
     )
-
-
-def test_the_form_of_a_ship_is_compiled_and_may_be_chosen():
-    published, package = kvlcc2(), kvlcc2("shipmmg")
-    assert published.compiled is not package.compiled
-    assert package.compiled is kvlcc2_l7("shipmmg").compiled
-
-
-def test_no_text_of_a_file_becomes_part_of_a_program():
-    source = accelerations_source({"r": (Term("import os", (("r", 1),)),)}, prime=False)
-    assert "import" not in source
-
-
-def test_each_coefficient_is_read_once_and_what_terms_share_is_taken_out():
-    functions = shipgym.load_model("mariner").compiled.functions
-    source = inspect.getsource(functions["accelerations"])
-    for row in range(40):
-        assert len(re.findall(rf"c\.c{row}\b", source)) == 1
-    sums = "".join(line for line in source.splitlines() if "dot =" in line)
-    # of 40 terms with 93 factors and as many coefficients
-    assert sums.count(" * ") < 80
 
 
 class Fix(NamedTuple):
@@ -176,52 +146,6 @@ def test_records_are_read_and_stored_where_their_rows_are(jit, monkeypatch):
     assert found == expected
 
 
-def test_the_source_of_what_loads_a_record_can_be_read():
-    source = inspect.getsource(loader(Layout(before=Fix, found=Anchor)["found"]))
-    assert "north=array[row_3 + entry]," in source
-
-
-NO_MATCH = """Failed in step (step: nopython frontend)
-No implementation of function Function(<built-in function sub>) found for signature:
-
- >>> sub(float64, none)
-
-There are 18 candidate implementations:
-During: typing of intrinsic-call at own.py (7)
-
-File "own.py", line 7:
-def drift(u, v):
-    return u - None
-    ^
-"""
-
-
-@pytest.mark.parametrize(
-    ("text", "reason"),
-    [
-        (
-            NO_MATCH,
-            (
-                " in drift (own.py, line 7): No implementation of function"
-                " Function(<built-in function sub>): sub(float64, none)"
-            ),
-        ),
-        (
-            "\x1b[1mFailed in step\n\x1b[31mUntyped name 'w'\nat own.py (25)",
-            " (own.py, line 25): Untyped name 'w'",
-        ),
-        (
-            f"Cannot unify\n<function drift_{'0a' * 16} at 0x7f>\nat own.py (25)",
-            ": Cannot unify",  # the line is that of who calls
-        ),
-        ("Failed in step", ": no reason given"),
-        ("", ": no reason given"),
-    ],
-)
-def test_a_reason_of_numba_s_is_told_in_one_sentence(text, reason):
-    assert explanation(ValueError(text), "own") == f"own: cannot be compiled{reason}"
-
-
 def asks():
     return GROUP, PART  # noqa: F821
 
@@ -246,27 +170,6 @@ def test_a_function_within_another_is_refused_with_what_it_uses_of_it():
         fingerprint(around(3), {})
 
 
-def test_another_ship_sea_or_function_has_a_fingerprint_of_its_own():
-    loop = LOOPS["simulate"].function
-    mariner, container = (
-        {**CALM_SEA.hooks(1), **shipgym.load_model(name).compiled.hooks(1)}
-        for name in ("mariner", "container")
-    )
-
-    def twice(motion, coefficients, ship):
-        return 0.0, 0.0, 0.0, 0.0, 2.0
-
-    tags = {
-        fingerprint(loop, mariner),
-        fingerprint(loop, container),
-        fingerprint(loop, {**mariner, "accelerations": twice}),
-        fingerprint(loop, {**mariner, "HAS_LAG": False}),
-        fingerprint(loop, {**mariner, **OPEN_SEA.hooks(1)}),
-    }
-    assert len(tags) == 5
-    assert fingerprint(loop, dict(mariner)) in tags
-
-
 def with_default(value, where="__defaults__"):
     function = FunctionType(double.__code__, {"__name__": "my_ship"}, "double")
     setattr(function, where, (value,) if where == "__defaults__" else {"k": value})
@@ -278,28 +181,6 @@ def times(factor):
         return factor * k
 
     return multiplied
-
-
-def typed_double(context, k):
-    return k(k), lambda context, builder, signature, values: builder.fadd(
-        values[0], values[0]
-    )
-
-
-def typed_square(context, k):
-    return k(k), lambda context, builder, signature, values: builder.fmul(
-        values[0], values[0]
-    )
-
-
-class Doubler:
-    def __init__(self, k):
-        self.k = 2 * k
-
-
-class Tripler:
-    def __init__(self, k):
-        self.k = 3 * k
 
 
 def looks_up(k):
@@ -314,10 +195,6 @@ def triple(k):
     return 3.0 * k
 
 
-def compiled_class(kind):
-    return jitclass([("k", types.int64)])(kind)
-
-
 def table(shape, at, value=1.0, dtype=float):
     numbers = np.zeros(shape, dtype)
     numbers.flat[at] = value
@@ -329,19 +206,14 @@ def table(shape, at, value=1.0, dtype=float):
     [
         ("TABLE", table(2000, 1000), table(2000, 1001)),
         ("TABLE", np.zeros(2000), np.zeros(2000, np.float32)),
-        ("TABLE", np.zeros(2000), np.zeros((2, 1000))),
-        ("TABLE", (np.zeros(2000), 1.0), (table(2000, 1000), 1.0)),
         ("TABLE", Fix(np.zeros(2000), 1.0), Fix(table(2000, 1000), 1.0)),
         ("TABLE", IntEnum("Berth", {"OUTER": 2}), IntEnum("Berth", {"OUTER": 3})),
         ("TABLE", Fix, Anchor),
-        ("TABLE", 0.5, 0.6),
         ("helper", double, triple),
         ("helper", double, called(FunctionType(double.__code__, {"__name__": "own"}))),
         ("helper", njit(double), njit(triple)),
         ("helper", njit(double), njit(double, fastmath=True)),
         ("helper", vectorize(double), vectorize(triple)),
-        ("helper", intrinsic(typed_double), intrinsic(typed_square)),
-        ("helper", compiled_class(Doubler), compiled_class(Tripler)),
         ("helper", njit(times(2.0)), njit(times(3.0))),
         ("helper", with_default(np.zeros(2000)), with_default(table(2000, 1000))),
         (
@@ -375,31 +247,6 @@ def test_what_a_module_within_a_module_holds_is_in_the_fingerprint():
         return fingerprint(FunctionType(reads.__code__, names), {})
 
     assert tag(1.0) == tag(1.0) != tag(2.0)
-
-
-def test_which_of_two_functions_a_name_means_is_in_the_fingerprint():
-    def uses_both(k):
-        return one(k) - other(k)  # noqa: F821
-
-    def uses_all(k):
-        return one(k) + other(k) + inner(k)  # noqa: F821
-
-    def tag(first, second):
-        names = {"__name__": "my_ship", "one": first, "other": second}
-        inner = FunctionType(uses_both.__code__, names)
-        names = {"__name__": "my_ship", "one": double, "other": triple, "inner": inner}
-        return fingerprint(FunctionType(uses_all.__code__, names), {})
-
-    assert tag(double, triple) == tag(double, triple) != tag(triple, double)
-
-
-def test_a_docstring_is_not_in_the_fingerprint():
-    def tag(text):
-        names: dict = {"__name__": "my_ship"}
-        exec(f'def measured(k):\n    """{text}"""\n    return 2.0 * k', names)
-        return fingerprint(names["measured"], {})
-
-    assert tag("What is measured.") == tag("Told otherwise.")
 
 
 def test_settings_and_processor_are_in_the_fingerprint():
