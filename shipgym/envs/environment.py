@@ -31,7 +31,7 @@ from shipgym.tasks.definition import read_definition
 from shipgym.tasks.task import Task
 
 if TYPE_CHECKING:
-    from shipgym.envs.artist import Artist
+    from shipgym.envs.rendering import Artist
 
 Space = (
     gymnasium.spaces.Box | gymnasium.spaces.Discrete | gymnasium.spaces.MultiDiscrete
@@ -379,7 +379,7 @@ class ShipsEnv:
 
 
 def _artists(mode: str, num_envs: int) -> list[Artist]:
-    from shipgym.envs.artist import Artist  # needed only for pictures
+    from shipgym.envs.rendering import Artist  # needed only for pictures
 
     return [Artist(mode, row) for row in range(num_envs)]
 

@@ -187,32 +187,6 @@ def test_waypoints_of_a_reset_hold_until_the_next(make):
     np.testing.assert_array_equal(path(), drawn)
 
 
-def test_a_model_index_chooses_among_the_ships_that_are_drawn_from():
-    options = {
-        "model": "mariner-tls-svm",
-        "ensemble": ["mariner"],
-        "speed_range": (0.5, 1.0),
-    }
-    env = many(COURSE, 2, **options)
-    env.reset(seed=0, options={"model_index": 7})
-    speeds = env.unwrapped.physical_state()["u"]
-    env.reset(seed=1, options={"model_index": 7})
-    again = env.unwrapped.physical_state()["u"]
-    assert speeds[0] == speeds[1] == again[0] == again[1]
-    env.reset(seed=0, options={"model_index": 8})
-    assert env.unwrapped.physical_state()["u"][0] != speeds[0]
-    for wrong in (-1, 256, 1.0, "first"):
-        with pytest.raises(
-            InputError,
-            match=r"model_index: expected an integer of at least 0",
-        ):
-            env.reset(options={"model_index": wrong})
-    with pytest.raises(InputError, match=r"model_index: expected.* at most 0"):
-        one().reset(options={"model_index": 1})
-    with pytest.raises(InputError, match="options: unknown key 'waypoints'"):
-        env.reset(options={"waypoints": HOOK})
-
-
 def test_libraries_read_the_steps_of_an_episode():
     assert one().spec.max_episode_steps == 1500
     assert one(episode_steps=50).spec.max_episode_steps == 50

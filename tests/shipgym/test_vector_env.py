@@ -307,9 +307,9 @@ def test_rows_outside_of_a_mask_keep_all_that_they_show():
     assert mask.tolist() == [True, False, False]
     with pytest.raises(
         InputError,
-        match=r"options with a reset_mask of some rows: unknown key 'model_index'",
+        match="options with a reset_mask of some rows: unknown key 'course_chan",
     ):
-        env.reset(options={"reset_mask": mask, "model_index": 0})
+        env.reset(options={"reset_mask": mask, "course_change_deg": 5.0})
 
 
 def test_the_last_infos_of_rows_that_go_on_are_zeros():
