@@ -5,9 +5,7 @@ from .benchmarking.run import benchmark as benchmark
 from .controllers.checker import check_controller as check_controller
 from .controllers.controller import Controller as Controller
 from .controllers.interface import Policy as Policy
-from .controllers.los_autopilot import AdaptiveLineOfSight as AdaptiveLineOfSight
-from .controllers.los_autopilot import IntegralLineOfSight as IntegralLineOfSight
-from .controllers.los_autopilot import LineOfSight as LineOfSight
+from .controllers.line_of_sight import IntegralLineOfSight as IntegralLineOfSight
 from .controllers.lq import LQ as LQ
 from .controllers.lqg import LQG as LQG
 from .controllers.mpc import MPC as MPC
@@ -17,7 +15,6 @@ from .controllers.registry import controller_kinds as controller_kinds
 from .controllers.registry import register_controller as register_controller
 from .controllers.robustness import MarginUncertainty as MarginUncertainty
 from .controllers.robustness import margin_uncertainty as margin_uncertainty
-from .controllers.turn_rate import TurnRate as TurnRate
 from .controllers.wheel_over import WheelOver as WheelOver
 from .policies.policy import LearnedPolicy as LearnedPolicy
 from .rollouts.course_keeping import Episodes as Episodes

@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 import gymnasium
 import numpy as np
 
+from agents import IntegralLineOfSight
 from agents.controllers.designs import design
-from agents.controllers.los_autopilot import LineOfSight
 from agents.controllers.lq import LQ
 from agents.rollouts.rollout import rollout
 from agents.training.evaluation import HeldOut
@@ -129,7 +129,7 @@ DEFAULTS = (
     DefaultRun("PPO", "shipgym/CourseKeeping-v0", 65_000, LQ),
     DefaultRun("SAC", "shipgym/CourseKeeping-v0", 20_000, LQ),
     DefaultRun("DQN", "shipgym/CourseKeepingDiscrete-v0", 100_000, LQ),
-    DefaultRun("PPO", "shipgym/PathFollowing-v0", 150_000, LineOfSight),
+    DefaultRun("PPO", "shipgym/PathFollowing-v0", 150_000, IntegralLineOfSight),
 )
 DEFAULTS_FOLDER = ROOT / "build" / "default_learners"
 DEFAULTS_PICTURE = ROOT / "docs" / "images" / "default_learners.png"

@@ -48,7 +48,7 @@ def autopilot_command(
         Option(
             metavar="NAMES",
             help=(
-                "Autopilots to design; default: pid,lq,turn-rate,preview-lq. "
+                "Autopilots to design; default: pid,lq,preview-lq. "
                 "Others: lqg, wheel-over, mpc."
             ),
         ),

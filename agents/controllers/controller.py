@@ -107,8 +107,6 @@ class Controller:
     reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "sway", "rudder")
     #: Whether it leads another controller, its `autopilot`, which the file holds too.
     has_autopilot: ClassVar[bool] = False
-    #: Kind of that controller, where it is designed with it.
-    leads: ClassVar[str] = "lq"
     #: Whether the file holds its design model too, its `ship`.
     has_ship: ClassVar[bool] = False
     #: Arrays that the file holds beside the gains: names of fields, and their axes: a
@@ -206,7 +204,7 @@ class Controller:
     @property
     def needed_signals(self) -> tuple[str, ...]:
         """Signals of `reads` that have an effect."""
-        is_linear = self.is_closed_form() and type(self).law is linear_law
+        is_linear = self.is_closed_form() and self.law is linear_law
         if not is_linear:
             return self.reads
         gains = self.parameters.gains._asdict()
@@ -245,7 +243,7 @@ class Controller:
         memory : NamedTuple
             For the next interval.
         """
-        return type(self).law(seen, memory, self.parameters)
+        return self.law(seen, memory, self.parameters)
 
     def predict(
         self,
@@ -293,7 +291,6 @@ class Controller:
             rudder=known["rudder"],
             heading_error_integral=known["heading_error_integral"],
             surge=known["surge"],
-            rate_of_turn=np.zeros(len(observations)),
         )
 
     def observed(self, observations: Floats) -> dict[str, Floats]:
@@ -307,7 +304,7 @@ class Controller:
 
     def loop(self) -> Compensator:
         """Linear controller for small motions, without limits, for the margins."""
-        if type(self).law is linear_law:
+        if self.law is linear_law:
             return Compensator.static(np.array(self.parameters.gains))
         return self._linearised()
 
@@ -356,7 +353,6 @@ class Controller:
             rudder=self.neutral_rudder + motions.rudder,
             heading_error_integral=motions.heading_error_integral,
             surge=zero,
-            rate_of_turn=zero,
         )
         kept = np.ones((len(remembered), n_ships))
         kept[remembered] = deviations.T[len(SIGNALS) :]

@@ -61,7 +61,7 @@ def design(
     own, of_autopilot = _divided(given)
     guide: Controller = made.from_model(
         task.ship,
-        autopilot=design(made.leads, task, of_autopilot),
+        autopilot=design("lq", task, of_autopilot),
         task=task.task,
         **own,
     )

@@ -160,7 +160,7 @@ class Guided(Controller):
         memory : NamedTuple
             For the next interval.
         """
-        return type(self).law(seen, memory, self.parameters)
+        return self.law(seen, memory, self.parameters)
 
     def predict(
         self,

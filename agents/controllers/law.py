@@ -28,7 +28,6 @@ class Signals(NamedTuple):
     rudder: Number  # rad
     heading_error_integral: Number  # rad s
     surge: Number  # m/s, through the water
-    rate_of_turn: Number  # rad/s, ordered; 0 to keep a heading
 
 
 class Turns(NamedTuple):

@@ -1,18 +1,30 @@
 """LQ autopilot: the feedback that minimises the environment's cost on a linear ship.
 
+A low-pass and a dead-band on its order keep the rudder quiet where they are asked for.
+
 Source: Norrbin 1972, On the added resistance due to steering on a straight course (the
 cost); van Amerongen 1982, Adaptive steering of ships, chapter 3; Anderson & Moore 1990,
-Optimal Control, chapters 2 and 3 (cross terms).
+Optimal Control, chapters 2 and 3 (cross terms); Fossen 2011, Handbook of Marine Craft
+Hydrodynamics and Motion Control, 13.2 (dead-band and filters of autopilots).
 """
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar, NamedTuple, Self
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from agents.controllers.controller import Controller
+from agents.controllers.controller import Bounds, Controller
+from agents.controllers.law import (
+    Law,
+    LinearFeedback,
+    Nothing,
+    Number,
+    Signals,
+    linear_law,
+)
 from agents.controllers.linear_loop import (
     ERROR,
     INTEGRAL,
@@ -23,10 +35,12 @@ from agents.controllers.linear_loop import (
     rate_weight,
     sample_ship,
 )
+from agents.controllers.margins import Compensator
 from shipgym import ShipModel
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.engine.compiling import tell_who_waits
+from shipgym.engine.records import Record
 from shipgym.models.by_name import takes_name
 from shipgym.tasks.scales import RUDDER_WEIGHT
 
@@ -47,17 +61,53 @@ class SteeringCost(NamedTuple):
         }
 
 
+class QuietFeedback(NamedTuple):
+    """Parameters of `quiet_law`."""
+
+    feedback: LinearFeedback
+    rudder_update: float  # share of a new order in its low-pass
+    rudder_band: float  # rad that an order is to differ from the last one
+
+
+class QuietMemory(NamedTuple):
+    """Memory of `quiet_law`."""
+
+    smooth: Number  # rad, order after its low-pass
+    order: Number  # rad, the last one
+    started: Number  # 0 where an episode begins, else 1
+
+
+def quiet_law(
+    seen: Signals, memory: QuietMemory, p: QuietFeedback
+) -> tuple[Number, QuietMemory]:
+    """Order of the linear law, smoothed, and held while it hardly changes."""
+    asked, _ = linear_law(seen, Nothing(), p.feedback)
+    filtered = memory.smooth + p.rudder_update * (asked - memory.smooth)
+    has_started = memory.started > 0.0
+    smooth = np.where(has_started, filtered, asked)
+
+    is_small = np.abs(smooth - memory.order) <= p.rudder_band
+    order = np.where(has_started & is_small, memory.order, smooth)
+    return order, QuietMemory(smooth, order, started=1.0)
+
+
 @dataclass(frozen=True, eq=False)
 class LQ(Controller):
     """Linear quadratic autopilot with integral action and neutral rudder.
 
     order = neutral rudder + sum of gain times deviation of sway, yaw rate, heading
-    error, rudder and the integral of the heading error.
+    error, rudder and the integral of the heading error, filtered where it is asked for.
     """
 
     kind: ClassVar[str] = "lq"
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = {
         signal: (signal, 1.0) for signal in SIGNALS
+    }
+    gain_names: ClassVar[tuple[str, ...]] = (*SIGNALS, "rudder_update", "rudder_band")
+    bounds: ClassVar[Mapping[str, Bounds]] = {
+        **Controller.bounds,
+        "rudder_update": Bounds(1e-6, 1.0),
+        "rudder_band": Bounds(0.0, np.pi),
     }
 
     @classmethod
@@ -70,6 +120,8 @@ class LQ(Controller):
         integral_lengths: float = 20.0,
         rudder_weight: float = RUDDER_WEIGHT,
         rate_weight_s2: float | None = None,
+        rudder_time: float = 0.0,
+        rudder_band_deg: float = 0.0,
     ) -> Self:
         """Design on a model, about straight running.
 
@@ -79,8 +131,8 @@ class LQ(Controller):
         the integral of the error; it is given the one with which an offset decays over
         about `integral_lengths` ship lengths, at hardly any cost.
 
-        Raises InputError if the model has no straight course, or an argument is out of
-        its range.
+        Raises InputError if the model has no straight course, an argument is out of its
+        range, or the low-pass makes the loop unstable.
 
         Parameters
         ----------
@@ -96,48 +148,65 @@ class LQ(Controller):
             the environment's.
         rate_weight_s2 : float, optional
             Weight of the squared rudder rate, s^2; by default `rate_weight`.
+        rudder_time : float
+            Time constant of a low-pass on the order, in times to travel one ship
+            length.
+        rudder_band_deg : float
+            By how much an order is to differ from the last one, degrees.
         """
-        made = lq_design(
+        check_number(rudder_time, "rudder_time", at_least=0.0)
+        check_number(rudder_band_deg, "rudder_band_deg", at_least=0.0, at_most=90.0)
+        interval = checked_interval(model, dt)
+        cost = steering_cost(
             model,
-            dt=dt,
             integral_lengths=integral_lengths,
             rudder_weight=rudder_weight,
             rate_weight_s2=rate_weight_s2,
         )
-        return cls.designed(model, made.ship, made.gains, made.design)
+        ship = measured = sample_ship(model, interval)
+        if "q" in model.state_names:
+            measured = sample_ship(model, interval, first_order=True)
+        gains = {
+            **lq_gains(measured, cost),
+            "rudder_update": interval / (interval + rudder_time * model.travel_time),
+            "rudder_band": float(np.radians(rudder_band_deg)),
+        }
+        design = {"integral_lengths": float(integral_lengths), **cost.weights}
+        return cls.designed(model, ship, gains, design)
 
+    @cached_property
+    def is_quiet(self) -> bool:
+        """True with a low-pass or a dead-band."""
+        return bool(
+            np.any(self.gains["rudder_update"] != 1.0)
+            or np.any(self.gains["rudder_band"] != 0.0)
+        )
 
-class LQDesign(NamedTuple):
-    """Gains of LQ on a ship, and how they were found."""
+    @property
+    def law(self) -> Law:
+        """Law that it steers by."""
+        return quiet_law if self.is_quiet else linear_law
 
-    ship: SampledShip
-    gains: dict[str, float]
-    design: dict[str, float]
+    @property
+    def memory_record(self) -> Record:
+        """Record of what the law remembers of each ship."""
+        return QuietMemory if self.is_quiet else Nothing
 
+    @cached_property
+    def parameters(self) -> Any:
+        """Parameters of its law."""
+        if not self.is_quiet:
+            return self.linear_feedback
+        return QuietFeedback(
+            self.linear_feedback,
+            rudder_update=self.gains["rudder_update"],
+            rudder_band=self.gains["rudder_band"],
+        )
 
-def lq_design(
-    model: ShipModel,
-    dt: float | None,
-    integral_lengths: float,
-    rudder_weight: float,
-    rate_weight_s2: float | None,
-) -> LQDesign:
-    """Design LQ with the arguments of `LQ.from_model`."""
-    interval = checked_interval(model, dt)
-    cost = steering_cost(
-        model,
-        integral_lengths=integral_lengths,
-        rudder_weight=rudder_weight,
-        rate_weight_s2=rate_weight_s2,
-    )
-    ship = measured = sample_ship(model, interval)
-    if "q" in model.state_names:
-        measured = sample_ship(model, interval, first_order=True)
-    return LQDesign(
-        ship=ship,
-        gains=lq_gains(measured, cost),
-        design={"integral_lengths": float(integral_lengths), **cost.weights},
-    )
+    def loop(self) -> Compensator:
+        """Loop without the dead-band, which small motions would never leave."""
+        without = replace(self, gains={**self.gains, "rudder_band": 0.0})
+        return super(LQ, without).loop()
 
 
 def steering_cost(

@@ -165,7 +165,7 @@ class MPC(WheelOver):
         current = self.estimated_current(seen, memory.current)
         plans = self.planned(seen, current, memory)
 
-        course, _ = type(self).law(seen, Nothing(), self.parameters)
+        course, _ = self.law(seen, Nothing(), self.parameters)
         knots = memory.steps / KNOT_STEPS
         course = course + added(plans, knots)
         steps = (memory.steps + 1.0) % KNOT_STEPS
@@ -435,7 +435,6 @@ class DesignModels:
             rudder=self.rudder,
             heading_error_integral=zero,
             surge=self.read("u"),
-            rate_of_turn=zero,
         )
 
 

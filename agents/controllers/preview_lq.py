@@ -319,7 +319,6 @@ class PreviewLQ(Guided):
     """LQ around the course of the path ahead: track keeping by 22 numbers."""
 
     kind: ClassVar[str] = "preview-lq"
-    leads: ClassVar[str] = "quiet-lq"
     law: ClassVar[Law] = staticmethod(preview_law)
     memory_record: ClassVar[Record] = PreviewMemory
     observes: ClassVar[tuple[str, ...]] = (*Guided.observes, *COURSE_ERROR, *TURNS)

@@ -16,20 +16,14 @@ if TYPE_CHECKING:
 _HOMES = {
     "pid": "agents.controllers.pid:PID",
     "lq": "agents.controllers.lq:LQ",
-    "quiet-lq": "agents.controllers.quiet_lq:QuietLQ",
     "lqg": "agents.controllers.lqg:LQG",
-    "turn-rate": "agents.controllers.turn_rate:TurnRate",
-    "los": "agents.controllers.los_autopilot:LineOfSight",
-    "ilos": "agents.controllers.los_autopilot:IntegralLineOfSight",
-    "alos": "agents.controllers.los_autopilot:AdaptiveLineOfSight",
+    "ilos": "agents.controllers.line_of_sight:IntegralLineOfSight",
     "wheel-over": "agents.controllers.wheel_over:WheelOver",
     "preview-lq": "agents.controllers.preview_lq:PreviewLQ",
     "mpc": "agents.controllers.mpc:MPC",
 }
-BUILT_IN = tuple(_HOMES)
-#: Those first that others build on. The suites know no rate of turn to steer, and the
-#: order of LQ is filtered where a filter is found for it.
-CLASSICAL = tuple(kind for kind in BUILT_IN if kind not in ("turn-rate", "quiet-lq"))
+#: Those first that others build on.
+CLASSICAL = tuple(_HOMES)
 C = TypeVar("C", bound="Controller")
 
 #: Controllers that users registered.
@@ -92,7 +86,7 @@ def _home(controller: type[Controller]) -> str:
 
 def controller_kinds() -> tuple[str, ...]:
     """Kinds of all controllers, those of users last."""
-    return (*BUILT_IN, *_REGISTERED)
+    return (*CLASSICAL, *_REGISTERED)
 
 
 def registered_modules() -> tuple[str, ...]:

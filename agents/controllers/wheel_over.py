@@ -108,7 +108,7 @@ class WheelOver(Guided):
         Parameters
         ----------
         model, autopilot, task
-            As in `LineOfSight.from_model`.
+            As in `IntegralLineOfSight.from_model`.
         lookahead_lengths : float, optional
             Lookahead on a leg, ship lengths; by default the task's.
         reach_lengths : float, optional

@@ -39,7 +39,6 @@ class BridgeInput(NamedTuple):
     sway: Number = 0.0
     surge: Number = 0.0
     rudder: Number = 0.0
-    rate_of_turn: Number = 0.0
     cross_track: Number = 0.0
     course: Number = 0.0
     roll: Number = 0.0
@@ -63,10 +62,6 @@ AUTOPILOT_INPUTS: Variables = {
     "sway": Variable("m/s", "through the water, to starboard positive"),
     "surge": Variable("m/s", "through the water"),
     "rudder": Variable("rad", "measured angle, to starboard positive"),
-    "rate_of_turn": Variable(
-        "rad/s",
-        "ordered rate of turn, to starboard positive; 0: to keep the heading to steer",
-    ),
     "cross_track": Variable(
         "m", "distance from the leg or arc, to starboard of it positive"
     ),
@@ -204,7 +199,6 @@ def heading_order(
         rudder=given.rudder,
         heading_error_integral=integral,
         surge=given.surge,
-        rate_of_turn=given.rate_of_turn,
     )
     order, memory = law(seen, state.memory, p.law)
     return order, state._replace(integral=integral, memory=memory)

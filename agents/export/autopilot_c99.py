@@ -163,11 +163,11 @@ def steering_step(
 ) -> Translated:
     """Write one step of a controller, of guidance the function `along_path`."""
     kinds = (BridgeInput, state, parameters)
-    law = type(agent).law
+    law = agent.law
     if not isinstance(agent, Guided):
         return c.function(heading_step, *kinds, law)
     pilot: Any = agent.autopilot
-    return c.function(along_path, *kinds, law, type(pilot).law)
+    return c.function(along_path, *kinds, law, pilot.law)
 
 
 def state_kind(agent: Any) -> Kind:

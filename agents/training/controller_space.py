@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from agents.controllers.designs import INNER, design, no_path
-from agents.controllers.los_autopilot import CRITICAL
+from agents.controllers.line_of_sight import CRITICAL
 from agents.controllers.preview_lq import own_course_share, own_reach
 from agents.controllers.registry import controller_class
 from agents.controllers.wheel_over import own_lead
@@ -73,8 +73,9 @@ def search_space(kind: str, task: BenchmarkTask) -> list[Setting]:
     if not leads:
         return space
     of_autopilot = []
-    led = controller_class(kind).leads
-    for setting in SEARCHED[led](task):
+    # the order of LQ is filtered where it leads by preview
+    led = quiet_space if kind == "preview-lq" else lq_space
+    for setting in led(task):
         of_autopilot.append(setting._replace(name=INNER + setting.name))
     return [*space, *of_autopilot]
 
@@ -177,11 +178,8 @@ def preview_space(task: BenchmarkTask) -> list[Setting]:
 SEARCHED: Mapping[str, Callable[[BenchmarkTask], list[Setting]]] = {
     "pid": pid_space,
     "lq": lq_space,
-    "quiet-lq": quiet_space,
     "lqg": lqg_space,
-    "los": los_space,
     "ilos": ilos_space,
-    "alos": ilos_space,
     "wheel-over": wheel_over_space,
     "preview-lq": preview_space,
     "mpc": mpc_space,

@@ -29,7 +29,7 @@ from shipgym.trials.trial import Trial
 if TYPE_CHECKING:
     from agents.agent_file import Agent
 
-DESIGNS = ("pid", "lq", "turn-rate", "preview-lq")
+DESIGNS = ("pid", "lq", "preview-lq")
 
 
 def verify(

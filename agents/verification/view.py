@@ -78,7 +78,6 @@ class VerificationView:
     linear: list[str]  # names of those with gains on signals
     gains: list[GainRow]
     neutral_rudders: list[float]  # of the latter, rad
-    design_notes: list[str]
     margins: list[MarginRow]
     best: str
     pilots: dict[str, dict[str, Any]]  # metrics by name, the best first
@@ -115,7 +114,6 @@ def verification_view(found: Verification, length: float) -> VerificationView:
         linear=list(linear),
         gains=_gain_rows(list(linear.values())),
         neutral_rudders=[design.neutral_rudder for design in linear.values()],
-        design_notes=_design_notes(designed),
         margins=_margin_rows(list(designed.values())),
         best=found.pilots[0].name,
         pilots=pilots,
@@ -303,24 +301,6 @@ def _gain_rows(designs: Sequence[Controller]) -> list[GainRow]:
             row = GainRow(name, unit, gains)
             rows.append(row)
     return rows
-
-
-def _design_notes(designed: Mapping[str, Controller]) -> list[str]:
-    """Remarks on the gains of designs that are more than gains on signals."""
-    notes = []
-    for name, design in designed.items():
-        if design.kind != "turn-rate":
-            continue
-        gains = design.gains
-        proportional = number(gains["proportional"])
-        integral = number(gains["integral"])
-        per_minute = np.degrees(60 * gains["rate"])
-        notes.append(
-            f"{name} steers a rate of turn: {proportional} rad per rad/s of its error,"
-            f" {integral} per rad of its integral, and the rudder of the steady turn;"
-            f" it changes courses at {fixed(per_minute, 1)}°/min."
-        )
-    return notes
 
 
 def _margin_rows(designs: Sequence[Controller]) -> list[MarginRow]:

@@ -19,7 +19,7 @@ from papers.xu2020_tank import xu_ship
 
 import agents
 import shipgym
-from agents.controllers.registry import BUILT_IN, controller_class
+from agents.controllers.registry import CLASSICAL, controller_class
 from agents.policies.network import Layer, Network
 from agents.policies.policy import LearnedPolicy
 from agents.suites.suite import FOLDER
@@ -127,7 +127,7 @@ def models(folder: Path) -> None:
 def controllers(folder: Path) -> None:
     """One of every kind."""
     folder.joinpath("controller").mkdir()
-    for kind in BUILT_IN:
+    for kind in CLASSICAL:
         made: Any = controller_class(kind)
         leads_lq = made.has_ship or kind == "preview-lq"
         led = agents.LQ if leads_lq else agents.PID

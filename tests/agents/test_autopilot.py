@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents import LQ, LineOfSight, sail
+from agents import LQ, IntegralLineOfSight, sail
 from agents.cli.tables import ranking_table
 from agents.jobs import JobEngine
 from agents.verification.chain import build_autopilot, verify
@@ -34,7 +34,6 @@ def test_the_folder_holds_report_model_metrics_and_all_autopilots(chain):
         "pid.json",
         "preview-lq.json",
         "report.html",
-        "turn-rate.json",
     ]
     assert list(folder.parent.iterdir()) == [folder]
 
@@ -57,7 +56,7 @@ def test_metrics_tell_probabilities_margins_and_ranking(chain):
     )
     assert metrics["imo"]["advance"]["probability"] == 1.0
     assert metrics["imo"]["tactical_diameter"]["probability"] == 0.0
-    assert sorted(metrics["ranking"]) == ["lq", "pid", "turn-rate"]
+    assert sorted(metrics["ranking"]) == ["lq", "pid"]
     costs = [metrics["controllers"][name]["cost_mean"] for name in metrics["ranking"]]
     assert costs == sorted(costs)
     for name in metrics["ranking"]:
@@ -143,7 +142,7 @@ def test_a_guest_of_another_environment_or_ship_is_wrong_input(
 ):
     path = tmp_path / "guest.json"
     if made_for == "paths":
-        LineOfSight.from_model(
+        IntegralLineOfSight.from_model(
             load_model("mariner"), autopilot=LQ.from_model(load_model("mariner"))
         ).save(path)
     else:

@@ -19,18 +19,14 @@ from agents import (
     LQG,
     MPC,
     PID,
-    AdaptiveLineOfSight,
     IntegralLineOfSight,
-    LineOfSight,
     PreviewLQ,
-    TurnRate,
     WheelOver,
     load_agent,
 )
 from agents.cli import app
 from agents.controllers.guided import TURNS, bend
 from agents.controllers.law import Turns
-from agents.controllers.quiet_lq import QuietLQ
 from agents.export.autopilot import AUTOPILOT_INPUTS, BridgeInput
 from agents.export.autopilot_c99 import autopilot_source
 from agents.export.ship_c99 import ShipInput, advance, ship_source
@@ -197,7 +193,7 @@ def every_number():
     ship = load_model("container-4dof-output-error")
     return PreviewLQ.from_model(
         ship,
-        autopilot=QuietLQ.from_model(ship, rudder_time=0.1, rudder_band_deg=0.5),
+        autopilot=LQ.from_model(ship, rudder_time=0.1, rudder_band_deg=0.5),
         task=path_following_task(roll=True),
         course_share=0.4,
         current_time=1.0,
@@ -220,18 +216,15 @@ HEADING = {
     "lq": LQ.from_model(MARINER),
     "lqg": LQG.from_model(MARINER),
     "lqg_in_waves": LQG.from_model(MARINER, wave_period=9.0),
-    "quiet_lq": QuietLQ.from_model(MARINER, rudder_time=0.1, rudder_band_deg=1.0),
-    "turn_rate": TurnRate.from_model(MARINER),
+    "quiet_lq": LQ.from_model(MARINER, rudder_time=0.1, rudder_band_deg=1.0),
     "my_own": Slowing(**vars(PID.from_model(MARINER))),
 }
 GUIDANCE = {
-    "los": LineOfSight.from_model(MARINER),
     "ilos": IntegralLineOfSight.from_model(MARINER),
-    "alos": AdaptiveLineOfSight.from_model(MARINER, autopilot=PID.from_model(MARINER)),
-    "wheel_over": WheelOver.from_model(MARINER),
-    "wheel_over_rate": WheelOver.from_model(
-        MARINER, autopilot=TurnRate.from_model(MARINER)
+    "ilos_pid": IntegralLineOfSight.from_model(
+        MARINER, autopilot=PID.from_model(MARINER)
     ),
+    "wheel_over": WheelOver.from_model(MARINER),
     "preview": PreviewLQ.from_model(MARINER),
     "preview_all": every_number(),
 }
@@ -254,7 +247,6 @@ SIZES = {
     "cross_track": 200.0,
     "next_turn_distance": 500.0,
     "second_turn_distance": 900.0,
-    "rate_of_turn": 0.004,
 }
 
 
@@ -277,8 +269,8 @@ def orders(agent, name, folder, steps):
     sizes = [SIZES.get(one, 0.5) for one in names]
     numbers = np.random.default_rng(0).normal(0.0, sizes, (steps, len(names)))
     numbers[:, names.index("set_point")] = 0.4 * (np.arange(steps) % 600 > 300)
-    for absent in {"rate_of_turn", "next_turn_angle"} & set(names):
-        numbers[::3, names.index(absent)] = 0.0  # no rate ordered, no turn ahead
+    if "next_turn_angle" in names:
+        numbers[::3, names.index("next_turn_angle")] = 0.0  # no turn ahead
 
     in_c, here = [], [0.0]
     for k, row in enumerate(numbers):
@@ -544,7 +536,7 @@ def broken_rules(source, folder):
 
 
 @pytest.mark.skipif(not shutil.which("cppcheck"), reason="cppcheck is missing")
-@pytest.mark.parametrize("name", ["turn_rate", "orders", "mariner"])
+@pytest.mark.parametrize("name", ["lq", "orders", "mariner"])
 def test_the_page_names_every_deviation_from_misra(name, tmp_path):
     page = (DOCS / "deployment.md").read_text(encoding="utf-8")
     named = set(re.findall(r"(?m)^\| (\d+\.\d+) \| ", page))

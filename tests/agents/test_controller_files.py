@@ -11,7 +11,7 @@ import pytest
 from agents import LQ, PID, load_agent
 from agents.agent_file import PRETRAINED, find_agent, list_pretrained
 from agents.controllers.interface import check_scales, model_hash
-from agents.controllers.registry import BUILT_IN, controller_class
+from agents.controllers.registry import CLASSICAL, controller_class
 from shipgym.errors import InputError
 from shipgym.models.catalogue import mariner
 from shipgym.ships.steering import SteeringGear
@@ -107,8 +107,7 @@ BAD_FILES = [
         {"arrays__transition": (1.3 * np.eye(3)).tolist()},
         "sampled poles below 1",
     ),
-    ("turn-rate", {"arrays__rates": [0.1, 0.0]}, "arrays.rudders: |rising order"),
-    ("los", {"autopilot": 3}, "autopilot: .*expected a table"),
+    ("ilos", {"autopilot": 3}, "autopilot: .*expected a table"),
     ("ilos", {"gains__lookahead": 0.0}, "gains.lookahead: .*expected a number"),
     ("mpc", {"ship__coefficients": {}}, "ship: "),
     ("mpc", {"autopilot__kind": "pid"}, "autopilot: "),
@@ -168,20 +167,20 @@ def test_a_missing_file_is_refused(tmp_path):
 
 def test_guidance_leads_what_keeps_a_heading(tmp_path):
     nested = changed(
-        "los", tmp_path, {"autopilot": json.loads(CORPUS["los"].read_text())}
+        "ilos", tmp_path, {"autopilot": json.loads(CORPUS["ilos"].read_text())}
     )
     with pytest.raises(
         InputError,
-        match="autopilot: expected a controller that keeps a heading, got 'los'",
+        match="autopilot: expected a controller that keeps a heading, got 'ilos'",
     ):
         load_agent(nested)
 
 
 def test_there_is_a_file_of_every_kind():
-    assert set(BUILT_IN) == set(CORPUS)
+    assert set(CLASSICAL) == set(CORPUS)
 
 
-@pytest.mark.parametrize("kind", BUILT_IN)
+@pytest.mark.parametrize("kind", CLASSICAL)
 def test_what_a_law_needs_is_checked_when_the_file_is_read(kind, tmp_path):
     """Not when it steers: a horizon of 2^32 steps asks for 64 GiB there."""
     design = controller_class(kind)

@@ -3,17 +3,13 @@
 import numpy as np
 import pytest
 
-from agents import LQG, PID, AdaptiveLineOfSight, IntegralLineOfSight, PreviewLQ
-from agents.controllers.quiet_lq import QuietLQ
-from agents.controllers.turn_rate import TurnRate
+from agents import LQ, LQG, PID, IntegralLineOfSight, PreviewLQ
 from tests.agents.mariners import MARINER
 
 REMEMBERING = [
     LQG.from_model(MARINER),
-    TurnRate.from_model(MARINER),
-    QuietLQ.from_model(MARINER, rudder_time=0.1),
+    LQ.from_model(MARINER, rudder_time=0.1),
     IntegralLineOfSight.from_model(MARINER, autopilot=PID.from_model(MARINER)),
-    AdaptiveLineOfSight.from_model(MARINER),
     PreviewLQ.from_model(MARINER, yaw_time=0.1),
 ]
 

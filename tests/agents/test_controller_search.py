@@ -116,12 +116,12 @@ def test_every_search_starts_at_the_design(kind: str) -> None:
 
 
 def test_guidance_leads_the_lq_that_was_tuned_and_needs_a_path() -> None:
-    led = design("los", PATH, {"lookahead_lengths": 3.0, "lq_integral_lengths": 50.0})
+    led = design("ilos", PATH, {"lookahead_lengths": 3.0, "lq_integral_lengths": 50.0})
     inner = design("lq", PATH, {"integral_lengths": 50.0})
     assert getattr(led, "autopilot").gains == inner.gains  # noqa: B009
     for ask in (search_space, design):
-        with pytest.raises(InputError, match="expected a path for 'los'"):
-            ask("los", CALM)
+        with pytest.raises(InputError, match="expected a path for 'ilos'"):
+            ask("ilos", CALM)
 
 
 def test_settings_found_are_read_from_the_file_of_the_suite(

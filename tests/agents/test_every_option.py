@@ -57,12 +57,12 @@ LINES = (
     ("trials tanker --draws 0 --depth 25", 0),
     (
         f"autopilot ship.toml {LINEAR} --draws 2 --seed 1 --agent pid.json --autopilots"
-        " lq,turn-rate,los --engine local --workers 1 --out report",
+        " lq,ilos --engine local --workers 1 --out report",
         0,
     ),
     (
         f"autopilot ship.toml {LINEAR} --draws 2 --tune 0.2 --autopilots"
-        " lq,turn-rate,preview-lq --out tuned-report",
+        " lq,preview-lq --out tuned-report",
         0,
     ),
     (f"autopilot ship.toml {WRONG} --out report2", 2),

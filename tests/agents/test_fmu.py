@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from fmpy import fmi2, validation
 
-from agents import LQ, TurnRate, WheelOver
+from agents import LQ, WheelOver
 from agents.export import fmu
 from agents.export.autopilot_c99 import autopilot_source
 from agents.export.fmu import write_fmu
@@ -77,7 +77,6 @@ BY_A_BRIDGE = {
     "sway": 0.1,
     "surge": 7.5,
     "rudder": 0.05,
-    "rate_of_turn": 0.003,
     "cross_track": 30.0,
     "course": 0.05,
     "next_turn_distance": 200.0,
@@ -88,7 +87,6 @@ BY_A_BRIDGE = {
 ALONG_ARCS = Task.of("PathFollowing", dt=2 * DT)
 PILOTS = {
     "lq": LQ.from_model(MARINER, dt=2 * DT),
-    "turn_rate": TurnRate.from_model(MARINER, dt=2 * DT),
     "wheel_over": WheelOver.from_model(MARINER, task=ALONG_ARCS),
 }
 

@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from agents import LQ, PID, PreviewLQ, TurnRate, WheelOver
+from agents import LQ, PID, PreviewLQ, WheelOver
 from shipgym.tasks.task import Task
 from tests.agents.bridge import Bridge
 from tests.agents.policies import MARINER
@@ -107,46 +107,6 @@ def between(x, points, values):
 
 def wrap(angle):
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
-
-
-def turn_rate_by_hand(file, given, memory):
-    """The four steps of the page; the memory is followed rate and integral part."""
-    gains, arrays, dt = file["gains"], file["arrays"], file["design"]["dt"]
-    share = dt * file["design"]["frequency"] / (1.0 + dt * file["design"]["frequency"])
-    scales = dict(
-        zip(file["observation_names"], file["observation_scales"], strict=True)
-    )
-    to_heading = wrap(given["set_point"] - given["heading"]) / gains["heading_time"]
-    wanted = given["rate_of_turn"] or max(
-        -gains["rate"], min(gains["rate"], to_heading)
-    )
-    followed, part = memory or (given["yaw_rate"], 0.0)
-    followed += share * (wanted - followed)
-    off = followed - given["yaw_rate"]
-    order = (
-        between(followed, arrays["rates"], arrays["rudders"])
-        + gains["proportional"] * off
-        + part
-    )
-    if abs(order) < scales["rudder"]:
-        part += gains["integral"] * dt * off
-    return max(-scales["rudder"], min(scales["rudder"], order)), (followed, part)
-
-
-def test_a_rate_of_turn_is_steered_as_the_page_says():
-    agent, random, memory = TurnRate.from_model(MARINER), np.random.default_rng(0), None
-    file, bridge = json.loads(json.dumps(agent.to_dict())), Bridge(agent)
-    for step in range(300):
-        given = dict(
-            zip(
-                ("set_point", "heading", "yaw_rate"),
-                random.normal(0, 0.01, 3),
-                strict=True,
-            )
-        )
-        given["rate_of_turn"] = 0.003 if step % 100 > 60 else 0.0
-        order, memory = turn_rate_by_hand(file, given, memory)
-        assert bridge.step(given) == pytest.approx(order, abs=1e-12)
 
 
 def test_wheel_over_is_what_the_page_says():

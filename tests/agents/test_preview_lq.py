@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from agents import LQ, PID, PreviewLQ, WheelOver, check_controller, load_agent
 from agents.controllers.law import Nothing, PathSignals, Turns
 from agents.controllers.preview_lq import PreviewMemory, summed_weight, weighed_turn
-from agents.controllers.quiet_lq import QuietLQ
 from agents.controllers.seen_current import CurrentMemory
 from agents.controllers.side_by_side import side_by_side
 from agents.rollouts.rollout import episode_costs, rollout
@@ -153,7 +152,7 @@ def test_designs_side_by_side_steer_as_each_alone():
 
 
 def test_it_is_a_controller_and_a_file(tmp_path):
-    quiet = QuietLQ.from_model(MARINER, rudder_time=0.1, rudder_band_deg=0.5)
+    quiet = LQ.from_model(MARINER, rudder_time=0.1, rudder_band_deg=0.5)
     guide = PreviewLQ.from_model(
         MARINER, task=PATH, autopilot=quiet, weight_3=-0.1, dead_band_deg=0.2
     )

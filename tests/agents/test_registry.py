@@ -155,7 +155,7 @@ def test_what_is_no_controller_is_refused():
             register_controller(wrong)
 
 
-@pytest.mark.parametrize("kind", registry.BUILT_IN)
+@pytest.mark.parametrize("kind", registry.CLASSICAL)
 def test_our_own_keep_their_kind_and_are_documented(kind):
     controller = registry.controller_class(kind)
     assert controller.kind == kind

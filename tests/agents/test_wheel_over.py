@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from agents import LQ, LineOfSight, WheelOver, check_controller, load_agent
+from agents import LQ, IntegralLineOfSight, WheelOver, check_controller, load_agent
 from agents.controllers.guided import bend
 from agents.controllers.law import Turns
 from agents.controllers.wheel_over import own_lead
@@ -51,7 +51,7 @@ def test_turns_and_a_current_cost_less_than_with_line_of_sight():
     engine, seeds = Engine(MARINER, 8, task), np.arange(8)
     plain, ours = (
         episode_costs(kind.from_model(MARINER, task=task), engine, seeds).mean()
-        for kind in (LineOfSight, WheelOver)
+        for kind in (IntegralLineOfSight, WheelOver)
     )
     assert ours < 0.7 * plain
 

@@ -1,11 +1,8 @@
-"""Line of sight over any heading autopilot, and integral and adaptive forms of it.
+"""Integral line of sight over any heading autopilot.
 
-Sources: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 10.3
-(line of sight); Borhaug, Pavlov & Pettersen 2008, Integral LOS control for path
-following of underactuated marine surface vessels in the presence of constant ocean
-currents, 47th IEEE Conference on Decision and Control (integral line of sight); Fossen
-2023, An adaptive line-of-sight (ALOS) guidance law for path following of aircraft and
-marine craft, IEEE Transactions on Control Systems Technology 31 (adaptive).
+Source: Borhaug, Pavlov & Pettersen 2008, Integral LOS control for path following of
+underactuated marine surface vessels in the presence of constant ocean currents, 47th
+IEEE Conference on Decision and Control.
 """
 
 from collections.abc import Mapping
@@ -18,7 +15,7 @@ import numpy as np
 from agents.controllers.controller import ANY_NUMBER, Bounds
 from agents.controllers.guided import Guided, with_path
 from agents.controllers.interface import Policy
-from agents.controllers.law import Law, Nothing, Number, PathSignals
+from agents.controllers.law import Law, Number, PathSignals
 from shipgym import ShipModel
 from shipgym.checks import check_number
 from shipgym.engine.records import Record
@@ -31,7 +28,7 @@ CRITICAL = 4.0
 
 
 class LineOfSightGains(NamedTuple):
-    """Parameters of the line-of-sight laws."""
+    """Parameters of `integral_line_of_sight`."""
 
     lookahead: float  # m
     integral: float  # 1/s
@@ -39,16 +36,9 @@ class LineOfSightGains(NamedTuple):
 
 
 class DriftMemory(NamedTuple):
-    """Memory of the line-of-sight laws that make up for drift."""
+    """Memory of `integral_line_of_sight`."""
 
-    drift: Number  # m, or rad of crab angle
-
-
-def line_of_sight(
-    seen: PathSignals, memory: Nothing, p: LineOfSightGains
-) -> tuple[Number, Nothing]:
-    """Course to the point on the leg one lookahead ahead (Fossen 2011, 10.3.2)."""
-    return -np.arctan2(seen.cross_track, p.lookahead), memory
+    drift: Number  # m
 
 
 def integral_line_of_sight(
@@ -64,27 +54,16 @@ def integral_line_of_sight(
     return course, DriftMemory(drift)
 
 
-def adaptive_line_of_sight(
-    seen: PathSignals, memory: DriftMemory, p: LineOfSightGains
-) -> tuple[Number, DriftMemory]:
-    """Course less an estimate of the crab angle (Fossen 2023)."""
-    cross_track = seen.cross_track
-    distance = np.hypot(p.lookahead, cross_track)
-    rate = p.integral * cross_track / distance
-    drift = memory.drift + p.dt * rate
-    course = -memory.drift - np.arctan2(cross_track, p.lookahead)
-    return course, DriftMemory(drift)
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LineOfSight(Guided):
-    """Steer for the point on the leg one lookahead ahead (Fossen 2011, 10.3.2).
+class IntegralLineOfSight(Guided):
+    """Line of sight with an integral of the cross-track error.
 
-    A steady current sets the ship off the path.
+    The error goes to 0 in a steady current.
     """
 
-    kind: ClassVar[str] = "los"
-    law: ClassVar[Law] = staticmethod(line_of_sight)
+    kind: ClassVar[str] = "ilos"
+    law: ClassVar[Law] = staticmethod(integral_line_of_sight)
+    memory_record: ClassVar[Record] = DriftMemory
     gain_names: ClassVar[tuple[str, ...]] = (*Guided.gain_names, "integral")
     bounds: ClassVar[Mapping[str, Bounds]] = {
         **Guided.bounds,
@@ -150,27 +129,3 @@ class LineOfSight(Guided):
             integral=gains["integral"],
             dt=self.design["dt"],
         )
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class IntegralLineOfSight(LineOfSight):
-    """Line of sight with an integral of the cross-track error.
-
-    The error goes to 0 in a steady current.
-    """
-
-    kind: ClassVar[str] = "ilos"
-    law: ClassVar[Law] = staticmethod(integral_line_of_sight)
-    memory_record: ClassVar[Record] = DriftMemory
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class AdaptiveLineOfSight(LineOfSight):
-    """Line of sight minus an estimate of the crab angle (Fossen 2023).
-
-    A steady current leaves no error.
-    """
-
-    kind: ClassVar[str] = "alos"
-    law: ClassVar[Law] = staticmethod(adaptive_line_of_sight)
-    memory_record: ClassVar[Record] = DriftMemory
