@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from shipgym.checks import check_choice
 from shipgym.errors import InputError
@@ -25,9 +25,6 @@ if TYPE_CHECKING:  # imported with the ships that need them
     from shipgym.ships.terms import Term
 
 LIBRARY = Path(__file__).parent / "library"
-
-
-Form = Literal["published", "shipmmg"]
 
 
 def model_of(
@@ -77,11 +74,11 @@ def tanker(rudder_limit_deg: float = 35.0) -> ShipModel:
     return replace(model, steering=steering)
 
 
-def kvlcc2(form: Form = "published") -> ShipModel:
-    """KVLCC2 at full scale, 320 m: MMG standard method, or shipmmg 0.0.11's variant."""
+def kvlcc2() -> ShipModel:
+    """KVLCC2 at full scale, 320 m, by the MMG standard method."""
     from shipgym.ships import kvlcc2 as file
 
-    model = kvlcc2_l7(form)
+    model = kvlcc2_l7()
     full_scale = file.Coefficients(**file.FULL_SCALE)
     return replace(
         model,
@@ -93,16 +90,9 @@ def kvlcc2(form: Form = "published") -> ShipModel:
     )
 
 
-def kvlcc2_l7(form: Form = "published") -> ShipModel:
-    """KVLCC2 as a model of 7 m; `form` as in `kvlcc2`."""
-    ship = get_equations("kvlcc2")
-    package_form = float(form == "shipmmg")
-    model = model_of(ship, {"PACKAGE_FORM": package_form})
-    return replace(
-        model,
-        name="kvlcc2-l7",
-        provenance={"source": ship.source, "form": form},
-    )
+def kvlcc2_l7() -> ShipModel:
+    """KVLCC2 as a model of 7 m."""
+    return replace(model_of(get_equations("kvlcc2")), name="kvlcc2-l7")
 
 
 REFERENCE_SHIPS: dict[str, Callable[[], ShipModel]] = {

@@ -209,13 +209,9 @@ class ShipEquations:
         shaft = ("n",) if self.shaft_acceleration is not None else ()
         return ("x", "y", "psi", "u", "v", "r", *roll, "delta", *shaft)
 
-    def form(self, coefficients: Mapping[str, float]) -> Accelerations:
-        """Equations for given coefficients; some ships have more than one form."""
-        return self.accelerations
-
     def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
-        """Functions to be compiled, the same for all coefficients of one form."""
-        hooks: list[tuple[str, Any]] = [("accelerations", self.form(coefficients))]
+        """Functions to be compiled, the same for all coefficients."""
+        hooks: list[tuple[str, Any]] = [("accelerations", self.accelerations)]
         if self.shaft_acceleration is not None:
             hooks.append(("shaft_acceleration", self.shaft_acceleration))
         return compiled_ship(
@@ -240,7 +236,7 @@ class ShipEquations:
         """
         numbers = self.numbers(coefficients, particulars, ship.shaft)
         c = self.coefficients_record(*numbers.tolist())
-        accelerations = self.form(coefficients)
+        accelerations = self.accelerations
         motions = _motions(channels)
         found = np.full((len(motions), len(ACCELERATIONS)), math.nan)
         for row, motion in zip(found, motions, strict=True):

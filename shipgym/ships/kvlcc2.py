@@ -3,19 +3,14 @@
 Source: Yasukawa & Yoshimura 2015, Introduction of MMG standard method for ship
 maneuvering predictions, J. Mar. Sci. Technol. 20; the numbers are those of the 7 m
 model, and the full-scale ship replaces those of scale. Forces are per density of water.
-
-The coefficient `PACKAGE_FORM` chooses the variant of the package shipmmg 0.0.11, which
-takes speed and drift at another point and has another law for the wake.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from math import copysign, fabs, pi, sqrt
 from typing import Any, NamedTuple
 
 from shipgym.engine.mathematics import arctan2, exponential, small_sin_cos
 from shipgym.engine.motion import Motion, Ship
-from shipgym.ships.equations import Accelerations, ShipEquations, record_of
+from shipgym.ships.equations import ShipEquations, record_of
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 
@@ -53,7 +48,6 @@ Coefficients = record_of(
         "C_2_starboard": 1.6,
         "C_2_port": 1.1,
         "x_P": -0.48,
-        "x_P_package": -0.69,
         "k_0": 0.2931,
         "k_1": -0.2753,
         "k_2": -0.1385,
@@ -63,8 +57,6 @@ Coefficients = record_of(
         "epsilon": 1.09,
         "kappa": 0.50,
         "f_alpha": 2.747,
-        # 1 for the form of shipmmg
-        "PACKAGE_FORM": 0.0,
         # scale, of the 7 m model, in m, m^2 and m^3; xG is forward of midship
         "L": 7.0,
         "d": 0.46,
@@ -91,13 +83,12 @@ FULL_SCALE = {
 
 
 class Flow(NamedTuple):
-    """Water that flows at hull, propeller and rudder."""
+    """Water that flows at hull and rudder."""
 
     U: float  # m/s
     v_: float  # sway by U
     r_: float  # yaw rate by U / L
     beta: float  # rad, drift angle
-    one_w_P: float  # 1 - wake fraction at the propeller
 
 
 def accelerations(
@@ -116,38 +107,13 @@ def accelerations(
     straight = exponential(-c.C_1 * fabs(beta_P))
     fuller = (1.0 - straight) * (C_2 - 1.0)
     one_w_P = (1.0 - c.w_P0) * (1.0 + fuller)
+    flow = Flow(U, v * per_U, r_, beta)
 
-    flow = Flow(U, v * per_U, r_, beta, one_w_P)
-    return accelerations_in(motion, c, flow)
-
-
-def package_accelerations(
-    motion: Motion, c: Any, ship: Ship
-) -> tuple[float, float, float, float, float]:
-    """Accelerations as in shipmmg 0.0.11: flow at the centre of mass, Gaussian wake."""
-    u, v, r = motion.u, motion.v, motion.r
-    v_G = v - r * c.xG
-    U = sqrt(u * u + v_G * v_G)
-    per_U = 1.0 / U
-    beta = arctan2(-v_G, fabs(u))  # the arc sine of -v_G / U
-    r_ = r * c.L * per_U
-
-    beta_P = beta - c.x_P_package * r_
-    w_P = c.w_P0 * exponential(-4.0 * beta_P * beta_P)
-
-    flow = Flow(U, v * per_U, r_, beta, 1.0 - w_P)
-    return accelerations_in(motion, c, flow)
-
-
-def accelerations_in(
-    motion: Motion, c: Any, flow: Flow
-) -> tuple[float, float, float, float, float]:
-    """Accelerations in a flow: the forces by mass and added mass."""
     L = c.L
     X_H, Y_H, N_H = hull_forces(c, flow)
 
     # propeller: T = n^2 D^4 K_T(J), J = inflow / tip
-    inflow = motion.u * flow.one_w_P
+    inflow = u * one_w_P
     tip = motion.n * c.D_P
     K_T_nn = c.k_0 * tip * tip + c.k_1 * tip * inflow + c.k_2 * inflow * inflow
     T = c.D_P**2 * K_T_nn
@@ -258,15 +224,6 @@ def rudder_force(
     return 0.5 * c.A_R * c.f_alpha * U_R * across, sine, cosine
 
 
-@dataclass(frozen=True)
-class TwoForms(ShipEquations):
-    """Published equations, or those of shipmmg where `PACKAGE_FORM` is 1."""
-
-    def form(self, coefficients: Mapping[str, float]) -> Accelerations:
-        """Accelerations of the form that the coefficients ask for."""
-        return package_accelerations if coefficients["PACKAGE_FORM"] else accelerations
-
-
 def particulars(name: str, c: Any, beam: float, speed: float) -> Particulars:
     """Particulars of the ship at a scale: beam in m, service speed in m/s."""
     to_prime = c.d / c.L  # added masses are given by rho L^2 d / 2
@@ -291,7 +248,7 @@ def particulars(name: str, c: Any, beam: float, speed: float) -> Particulars:
     )
 
 
-SHIP = TwoForms(
+SHIP = ShipEquations(
     "kvlcc2",
     "Yasukawa & Yoshimura 2015, Introduction of MMG standard method for ship"
     " maneuvering predictions",

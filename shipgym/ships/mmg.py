@@ -19,7 +19,6 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.engine.mathematics import arctan2, exponential, small_sin_cos
 from shipgym.engine.motion import Motion, Ship
-from shipgym.errors import InputError
 from shipgym.ships import kvlcc2
 from shipgym.ships.equations import ShipEquations, record_of
 from shipgym.ships.kvlcc2 import Mass, planar_accelerations
@@ -82,8 +81,7 @@ def standard_form(
 ) -> dict[str, float]:
     """Coefficients of the general form from those of the standard form, as KVLCC2 has.
 
-    `speed`, m/s, and `shaft`, 1/s, are those at service. Raises InputError for the
-    variant of shipmmg, whose wake has another law.
+    `speed`, m/s, and `shaft`, 1/s, are those at service.
     """
     # What the general form has beyond the standard method, with the values that make it
     # the standard one.
@@ -98,11 +96,6 @@ def standard_form(
         "N_rr": 0.0,
     }
     c = beyond | dict(model_coefficients)
-    if c["PACKAGE_FORM"]:
-        raise InputError(
-            "kvlcc2: expected the published form, got that of shipmmg, whose wake"
-            " differs"
-        )
     c["C_2"] = 0.5 * (c["C_2_starboard"] + c["C_2_port"])
     c["C_2_side"] = 0.5 * (c["C_2_starboard"] - c["C_2_port"])
     c["gamma_R"] = 0.5 * (c["gamma_plus"] + c["gamma_minus"])

@@ -1,9 +1,8 @@
 """Golden sections `derivatives` and `manoeuvres`: the physics of every ship, without an
 environment.
 
-`models.json` has ships beside the shipped ones: KVLCC2 at both scales in the form of
-the package shipmmg, one of each printed structure with made-up coefficients, and two
-grey boxes, as `ShipModel.save` wrote them.
+`models.json` has ships beside the shipped ones: one of each printed structure with
+made-up coefficients, and two grey boxes, as `ShipModel.save` wrote them.
 """
 
 from __future__ import annotations

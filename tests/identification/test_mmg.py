@@ -95,11 +95,6 @@ def test_kvlcc2_in_the_general_form_has_her_own_accelerations() -> None:
         np.testing.assert_allclose(
             at(ship_of({}), motion), own, rtol=0.0, atol=1e-13 * np.abs(own).max()
         )
-    other_wake = dict(kvlcc2.SHIP.coefficients) | {"PACKAGE_FORM": 1.0}
-    with pytest.raises(
-        InputError, match="expected the published form, got that of shipmmg"
-    ):
-        mmg.standard_form(other_wake, 1.179, 11.85)
 
 
 def test_terms_beyond_the_standard_form_act_as_they_are_named() -> None:

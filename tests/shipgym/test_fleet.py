@@ -1,4 +1,4 @@
-"""Container ship, tanker and KVLCC2 against the MSS toolbox and shipmmg
+"""Container ship, tanker and KVLCC2 against the MSS toolbox and the published form
 (../shared/reference)."""
 
 from dataclasses import replace
@@ -178,40 +178,24 @@ SHIP_STATE = (
 
 
 @pytest.mark.parametrize(
-    ("ship", "form", "state", "n", "expected"),
+    ("ship", "state", "n", "expected"),
     [
         (
             kvlcc2_l7,
-            "shipmmg",
-            MODEL_STATE,
-            10.8532517036481,
-            (-0.00740899684976068, -0.00861434626131447, 0.0044770137934743),
-        ),
-        (
-            kvlcc2_l7,
-            "published",
             MODEL_STATE,
             10.8532517036481,
             (-0.00742457323619287, -0.00861722011006149, 0.00448031124716304),
         ),
         (
             kvlcc2,
-            "shipmmg",
-            SHIP_STATE,
-            1.68450101953431,
-            (0.0151235379640384, -0.00783183791136703, -0.000248099883982493),
-        ),
-        (
-            kvlcc2,
-            "published",
             SHIP_STATE,
             1.68450101953431,
             (0.0152436101539732, -0.00801784894791814, -0.000243699776273127),
         ),
     ],
 )
-def test_quoted_rows_of_kvlcc2(ship, form, state, n, expected):
-    rates = ship(form).derivatives([0.0, 0.0, 0.0, *state], [state[-1], n])
+def test_quoted_rows_of_kvlcc2(ship, state, n, expected):
+    rates = ship().derivatives([0.0, 0.0, 0.0, *state], [state[-1], n])
     np.testing.assert_allclose(rates[3:6], expected, rtol=1e-10)
 
 
@@ -242,12 +226,10 @@ def test_all_rows_of_kvlcc2():
             row["r_rad_s"],
             row["delta_rad"],
         ]
-        for form, prefix in (("published", "paperform_dot"), ("shipmmg", "dot")):
-            rates = ship(form).derivatives(state, [row["delta_rad"], row["n_rps"]])
-            expected = [
-                row[f"{prefix}_{name}"] for name in ("u_m_s2", "v_m_s2", "r_rad_s2")
-            ]
-            np.testing.assert_allclose(rates[3:6], expected, rtol=1e-10)
+        rates = ship().derivatives(state, [row["delta_rad"], row["n_rps"]])
+        names = ("u_m_s2", "v_m_s2", "r_rad_s2")
+        expected = [row[f"paperform_dot_{name}"] for name in names]
+        np.testing.assert_allclose(rates[3:6], expected, rtol=1e-10)
 
 
 COLUMNS = {
@@ -281,12 +263,6 @@ RUNS = {
     "tanker_dmax35_zigzag_20_20": lambda: manoeuvres.zigzag(
         tanker(), 20, 20, duration=1000, switch="step", water_depth=DEEP
     ),
-    "kvlcc2_L7_turning_35": lambda: manoeuvres.turning_circle(
-        kvlcc2_l7("shipmmg"), 35, 200, 0.02
-    ),
-    "kvlcc2_L7_zigzag_20_20": lambda: manoeuvres.zigzag(
-        kvlcc2_l7("shipmmg"), 20, 20, duration=160, dt=0.02, switch="step"
-    ),
     "kvlcc2_L7_paperform_turning_35": lambda: manoeuvres.turning_circle(
         kvlcc2_l7(), 35, 200, 0.02
     ),
@@ -316,7 +292,6 @@ def test_trajectories_are_the_reference_s(name):
         ("container_zigzag_20_20", 5.07, 5.36),
         ("tanker_zigzag_10_10", 6.27, 14.75),
         ("tanker_dmax35_zigzag_20_20", 12.33, 15.94),
-        ("kvlcc2_L7_zigzag_20_20", 10.52, 15.11),
         ("kvlcc2_L7_paperform_zigzag_20_20", 10.53, 15.71),
     ],
 )
@@ -333,9 +308,6 @@ def test_overshoots(run, first, second):
         (tanker(), 35, 1500, 3.24, 3.13),
         (kvlcc2_l7(), 35, 200, 3.08, 3.12),
         (kvlcc2_l7(), -35, 200, 3.09, 3.10),
-        (kvlcc2_l7("shipmmg"), -35, 200, 2.92, 2.75),
-        (kvlcc2("shipmmg"), 35, 1350, 3.00, 2.98),
-        (kvlcc2("shipmmg"), -35, 1350, 2.86, 2.72),
     ],
     ids=lambda value: value.name if isinstance(value, ShipModel) else None,
 )
@@ -388,47 +360,6 @@ def test_port_is_the_mirror_of_starboard_where_the_ship_is_symmetric(name):
             starboard[channel], -port[channel], rtol=0.0, atol=1e-9 * span
         )
     np.testing.assert_allclose(starboard["u"], port["u"], rtol=1e-9)
-
-
-def test_kvlcc2_and_its_model_scale_by_froude():
-    """The hull alone scales: with the same wake fraction and the model's shaft the
-    prime turn is the same."""
-    scale = 2.0
-    small, numbers = kvlcc2_l7(), kvlcc2_l7().coefficients
-    larger = {
-        **numbers,
-        **{key: numbers[key] * scale for key in ("L", "d", "xG", "D_P", "H_R")},
-        "A_R": numbers["A_R"] * scale**2,
-        "volume": numbers["volume"] * scale**3,
-    }
-    lengths = {
-        key: small.particulars[key] * scale
-        for key in ("length", "beam", "draught", "xg", "yaw_gyradius")
-    }
-    mass, speed = (
-        small.particulars["mass"] * scale**3,
-        small.particulars["speed"] * scale**0.5,
-    )
-    particulars = replace(
-        small.particulars,
-        **lengths,
-        mass=mass,
-        speed=speed,
-        rudder_area=larger["A_R"],
-        propeller_diameter=larger["D_P"],
-    )
-    big = replace(
-        small,
-        particulars=particulars,
-        coefficients=larger,
-        service_shaft_speed=11.85159 / scale**0.5,
-        steering=shipgym.SteeringGear(35.0, 15.8 / scale**0.5),
-    )
-    dt = 0.05
-    one = manoeuvres.turning_circle(small, 35, 100, dt)
-    other = manoeuvres.turning_circle(big, 35, 100 * scale**0.5, dt * scale**0.5)
-    np.testing.assert_allclose(other["psi"], one["psi"], rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(other["x"], scale * one["x"], rtol=1e-8, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["container", "tanker", "kvlcc2", "kvlcc2-l7"])
