@@ -41,12 +41,6 @@ from .estimators.search import SearchResult as SearchResult
 from .estimators.tuned import TunedLSSVM as TunedLSSVM
 from .judging.uncertainty import Uncertainty as Uncertainty
 from .models.forces import (
-    ForceRegression as ForceRegression,
-)
-from .models.forces import (
-    force_regression as force_regression,
-)
-from .models.forces import (
     identify_forces as identify_forces,
 )
 from .models.prior_knowledge import PriorKnowledge as PriorKnowledge

@@ -18,14 +18,11 @@ from identification.estimators.lssvm import TruncatedLSSVM
 from identification.estimators.threads import single_threaded
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.arrays import Floats, Integers
-from shipgym.checks import check_choice
 from shipgym.ships import Term, get_structure
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
 
 FORCES = ("X", "Y", "N")
 FEWEST = 4  # samples between jumps
-#: How each method chooses the directions that it keeps.
-METHODS = {"ls": "full", "tls-svm": "l-curve"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +54,8 @@ class ForceRegression:
 
     def scales(self) -> Floats:
         """Root mean square of each row's force over all tests, shape (n_rows,)."""
-        sizes = []
-        for i in range(len(FORCES)):
-            own = self.targets[self.equation == i]
-            size = root_mean_square(own)
-            sizes.append(size or 1.0)
-        by_force = np.array(sizes)
+        own = [self.targets[self.equation == i] for i in range(len(FORCES))]
+        by_force = np.array([root_mean_square(targets) or 1.0 for targets in own])
         return by_force[self.equation]
 
     def r_squared(self, coefficients: Floats) -> dict[str, float]:
@@ -71,9 +64,7 @@ class ForceRegression:
         shares = {}
         for i, force in enumerate(FORCES):
             own = self.equation == i
-            targets = self.targets[own]
-            share = r2_score(targets, fitted[own])
-            shares[force] = float(share)
+            shares[force] = float(r2_score(self.targets[own], fitted[own]))
         return shares
 
 
@@ -323,7 +314,6 @@ def identify_forces(
     structure: str = "pmm18",
     particulars: Particulars | None = None,
     *,
-    method: str = "tls-svm",
     rank: int | None = None,
     model_inertia: bool = True,
     steering: SteeringGear | None = None,
@@ -341,15 +331,12 @@ def identify_forces(
         As in `force_regression`; the service speed is that of the model.
     structure : str
         `pmm38`, `pmm18` or another table of shares.
-    method : {"tls-svm", "ls"}
-        Truncated LS-SVM, or least squares; each of X, Y and N is scaled by its root
-        mean square.
     rank : int, optional
-        Directions that `tls-svm` keeps; by default by its L-curve.
+        Directions that the truncated LS-SVM keeps; by default by its L-curve. Each of
+        X, Y and N is scaled by its root mean square.
     steering, name : optional
         Of the model; the name by default the ship's.
     """
-    estimator = _estimator(method, rank)
     if particulars is None:
         raise InputError(
             "particulars: expected at least length, speed and mass of the ship, got"
@@ -362,10 +349,11 @@ def identify_forces(
         particulars=particulars,
         model_inertia=model_inertia,
     )
+    estimator = TruncatedLSSVM(rank=rank, fit_intercept=False)
     values, covariance = fit_forces(regression, estimator)
     provenance = {
         "structure": structure,
-        "method": method,
+        "method": TruncatedLSSVM.name,
         "rank": estimator.rank_,
         "r_squared": regression.r_squared(values),
         "trials": [{"name": trial.name, "sha256": trial.sha256} for trial in trials],
@@ -378,20 +366,6 @@ def identify_forces(
         covariance=covariance,
         provenance=provenance,
         coefficients=by_name(regression.names, values),
-    )
-
-
-def _estimator(method: str, rank: int | None) -> TruncatedLSSVM:
-    check_choice(method, METHODS, "method")
-    if rank is not None and method != "tls-svm":
-        raise InputError(
-            f"rank: expected none with method {method!r}, which keeps all, got {rank};"
-            " choose 'tls-svm'"
-        )
-    return TruncatedLSSVM(
-        selection=METHODS[method],
-        rank=rank,
-        fit_intercept=False,
     )
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,62 +16,6 @@ STEP = 0.2  # of the grid, in the time to sail one ship length
 STEPS = 5  # in a window, over which velocities are averaged
 
 
-class _Record(NamedTuple):
-    """A trial in units of length and service speed, arrays of shape (n_samples,)."""
-
-    t: Floats
-    inputs: SurgeSwayInputs
-    psi: Floats
-    #: velocity north and east over ground, and ahead through the water; NaN where not
-    #: measured
-    seen: tuple[Floats, Floats, Floats]
-
-    def inputs_on(self, grid: Floats, shaft_speed: float | None) -> Floats:
-        """Inputs at the times of a grid, shaft speeds by that at the start.
-
-        Shape (n_times, 5).
-        """
-        shaft = np.ones(len(self.t))
-        if shaft_speed is not None:
-            shaft = self.inputs.n / shaft_speed
-        relative = self.inputs._replace(n=shaft)
-        return _on_grid(grid, self.t, relative)
-
-    def seen_on(self, grid: Floats) -> Floats:
-        """Velocities at the times of a grid; NaN after the end, shape (n_times, 3)."""
-        velocities = _on_grid(grid, self.t, self.seen)
-        is_after = grid > self.t[-1]
-        velocities[is_after] = np.nan
-        return velocities
-
-
-def _record(trial: Trial, travel_time: float, speed: float) -> _Record:
-    wind = wind_accelerations(trial) * travel_time / speed
-    shaft = np.zeros(len(trial))
-    if "n" in trial:
-        shaft = trial["n"]
-    psi = trial["psi"]
-    ahead, aside = over_ground(trial)
-    north, east = rotate_to_body(ahead, aside, -psi)
-    logged = np.full(len(trial), np.nan)
-    if "v" in trial.derived and "u" not in trial.derived:
-        logged = trial["u"]
-
-    inputs = SurgeSwayInputs(
-        r=trial["r"] * travel_time,
-        delta=trial["delta"],
-        n=shaft,
-        ahead=wind[:, 0],
-        aside=wind[:, 1],
-    )
-    return _Record(
-        t=(trial.t - trial.t[0]) / travel_time,
-        inputs=inputs,
-        psi=psi,
-        seen=(north / speed, east / speed, logged / speed),
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class Runs:
     """Trials on one grid of time; a shorter one stays at its last sample.
@@ -82,7 +25,9 @@ class Runs:
 
     inputs: Floats  # as of `SurgeSwayInputs`, shape (n_times, 5, n_trials)
     psi: Floats  # shape (n_times, n_trials)
-    seen: Floats  # means over windows of time, shape (n_windows, 3, n_trials)
+    #: velocities north and east over ground, and ahead through the water; means over
+    #: windows of time, NaN where not measured, shape (n_windows, 3, n_trials)
+    seen: Floats
 
     @property
     def n_trials(self) -> int:
@@ -93,24 +38,53 @@ class Runs:
 def trials_on_one_grid(trials: Sequence[Trial], length: float, speed: float) -> Runs:
     """The trials on one grid, in units of length and service speed."""
     travel_time = length / speed
-    records = [_record(trial, travel_time, speed) for trial in trials]
-    shaft_speed = _starting_shaft_speed(trials)
-
-    longest = max(record.t[-1] for record in records)
+    times = [(trial.t - trial.t[0]) / travel_time for trial in trials]
+    longest = max(t[-1] for t in times)
     window = STEP * STEPS
     n_steps = int(longest / window) * STEPS
     grid: Floats = np.arange(n_steps + 1, dtype=np.float64) * STEP
+    shaft_speed = _starting_shaft_speed(trials)
 
     inputs, headings, seen = [], [], []
-    for record in records:
-        inputs.append(record.inputs_on(grid, shaft_speed))
-        headings.append(np.interp(grid, record.t, record.psi))
-        seen.append(record.seen_on(grid))
+    for trial, t in zip(trials, times, strict=True):
+        moved_by = _inputs(trial, travel_time, speed, shaft_speed)
+        inputs.append(_on_grid(grid, t, moved_by))
+        headings.append(np.interp(grid, t, trial["psi"]))
+        velocities = _on_grid(grid, t, _seen(trial, speed))
+        velocities[grid > t[-1]] = np.nan
+        seen.append(velocities)
     return Runs(
         inputs=np.stack(inputs, axis=-1),
         psi=np.stack(headings, axis=-1),
         seen=window_means(np.stack(seen, axis=-1)),
     )
+
+
+def _inputs(
+    trial: Trial, travel_time: float, speed: float, shaft_speed: float | None
+) -> SurgeSwayInputs:
+    """What moves the ship, arrays of shape (n_samples,)."""
+    wind = wind_accelerations(trial) * travel_time / speed
+    shaft = np.ones(len(trial))
+    if shaft_speed is not None:
+        shaft = trial["n"] / shaft_speed
+    return SurgeSwayInputs(
+        r=trial["r"] * travel_time,
+        delta=trial["delta"],
+        n=shaft,
+        ahead=wind[:, 0],
+        aside=wind[:, 1],
+    )
+
+
+def _seen(trial: Trial, speed: float) -> tuple[Floats, Floats, Floats]:
+    """Velocity north and east over ground, and ahead through the water if logged."""
+    ahead, aside = over_ground(trial)
+    north, east = rotate_to_body(ahead, aside, -trial["psi"])
+    logged = np.full(len(trial), np.nan)
+    if "v" in trial.derived and "u" not in trial.derived:
+        logged = trial["u"]
+    return north / speed, east / speed, logged / speed
 
 
 def _on_grid(grid: Floats, t: Floats, rows: Sequence[Floats]) -> Floats:
@@ -121,15 +95,9 @@ def _on_grid(grid: Floats, t: Floats, rows: Sequence[Floats]) -> Floats:
 
 def _starting_shaft_speed(trials: Sequence[Trial]) -> float | None:
     """Median shaft speed at the start, 1/s; None where not all trials turn ahead."""
-    starts = []
-    for trial in trials:
-        if "n" not in trial:
-            return None
-        start = trial["n"][0]
-        if not start > 0.0:
-            return None
-        starts.append(start)
-    return float(np.median(starts))
+    if not all("n" in trial and trial["n"][0] > 0.0 for trial in trials):
+        return None
+    return float(np.median([trial["n"][0] for trial in trials]))
 
 
 def window_means(values: Floats) -> Floats:

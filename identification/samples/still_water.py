@@ -114,7 +114,7 @@ def _mean_wind_speeds(trials: Mapping[str, Trial]) -> dict[str, float]:
     """Mean wind speed of those trials with accelerations by it, m/s."""
     speeds = {}
     for name, trial in trials.items():
-        if "wind_udot" in trial:
+        if {"wind_udot", "wind_speed"} <= trial.channels.keys():
             mean = trial["wind_speed"].mean()
             speeds[name] = float(mean)
     return speeds

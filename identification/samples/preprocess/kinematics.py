@@ -1,12 +1,15 @@
-"""Positions, heading and velocities smoothed together, as derivatives of each other."""
+"""Positions, heading and velocities smoothed together, as derivatives of each other.
+
+By a Kalman filter and smoother of linear motions whose accelerations are random walks.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from identification.samples.preprocess.kalman import LinearSystem
 from identification.samples.preprocess.noise import is_noisy, noise_level
 from shipgym import InputError, Trial
 from shipgym.arrays import Floats
@@ -32,15 +35,12 @@ def smooth_kinematics(trial: Trial) -> Trial:
     t = trial.t
     states = _recorded(trial, HEADING)
     if "psi" not in trial or is_noisy(t, states.values()):
-        motion = heading_motion(t)
-        states = _smoothed(trial, list(states), motion)
-
+        states = _smoothed(trial, list(states), heading_motion(t))
     moving = _recorded(trial, PLANE)
     has_motion = {"u", "v"} & moving.keys() or {"x", "y"} <= moving.keys()
     if has_motion and is_noisy(t, moving.values()):
         motion = plane_motion(t, states["psi"])
         states |= _smoothed(trial, list(moving), motion)
-
     return trial.with_channels(
         {name: values for name, values in states.items() if name in trial}
     )
@@ -51,7 +51,7 @@ def _recorded(trial: Trial, names: Sequence[str]) -> dict[str, Floats]:
 
 
 @dataclass(frozen=True, eq=False)
-class RandomWalkMotion:
+class Motion:
     """States that follow from accelerations that are random walks.
 
     Attributes
@@ -75,7 +75,7 @@ class RandomWalkMotion:
     start_variances: Floats
 
 
-def heading_motion(t: Floats) -> RandomWalkMotion:
+def heading_motion(t: Floats) -> Motion:
     """Heading and yaw rate, whose yaw acceleration is a random walk."""
     h = np.diff(t)
     psi, r, rdot = range(3)
@@ -95,7 +95,7 @@ def heading_motion(t: Floats) -> RandomWalkMotion:
     )
     powers = np.array([[5, 4, 3], [4, 3, 2], [3, 2, 1]])
     steps = h[:, None, None]
-    return RandomWalkMotion(
+    return Motion(
         states=(*HEADING, "rdot"),
         guessed_by=("r", "psi"),
         transitions=transitions,
@@ -104,21 +104,27 @@ def heading_motion(t: Floats) -> RandomWalkMotion:
     )
 
 
-def plane_motion(t: Floats, psi: Floats) -> RandomWalkMotion:
+def plane_motion(t: Floats, psi: Floats) -> Motion:
     """Position, surge and sway at a known heading, whose accelerations random-walk.
 
     The mean of the heading's cosine and sine holds over each step. The random walk acts
     on velocities and accelerations as on those of `heading_motion`.
     """
-    _, _, u, v, udot, vdot = range(6)
-    transitions = _plane_transitions(t, psi)
-    process = np.zeros_like(transitions)
+    h = np.diff(t)
+    cosine = 0.5 * (np.cos(psi[1:]) + np.cos(psi[:-1]))
+    sine = 0.5 * (np.sin(psi[1:]) + np.sin(psi[:-1]))
+    # north and east by a unit ahead and aside, shape (2, 2, n_steps)
+    rotation = np.array([[cosine, -sine], [sine, cosine]])
+    position, velocity, acceleration = slice(0, 2), slice(2, 4), slice(4, 6)
+
+    transitions = np.tile(np.eye(6), (len(h), 1, 1))
+    transitions[:, position, velocity] = np.moveaxis(h * rotation, -1, 0)
+    transitions[:, position, acceleration] = np.moveaxis(0.5 * h**2 * rotation, -1, 0)
+    transitions[:, velocity, acceleration] = h[:, None, None] * np.eye(2)
     walk = heading_motion(t).process[:, 1:, 1:]
-    steps = range(len(walk))
-    for axis in ([u, udot], [v, vdot]):
-        block = np.ix_(steps, axis, axis)
-        process[block] = walk
-    return RandomWalkMotion(
+    process = np.zeros_like(transitions)
+    process[:, 2:, 2:] = np.kron(walk, np.eye(2))
+    return Motion(
         states=(*PLANE, "udot", "vdot"),
         guessed_by=("u", "x", "v"),
         transitions=transitions,
@@ -127,90 +133,99 @@ def plane_motion(t: Floats, psi: Floats) -> RandomWalkMotion:
     )
 
 
-def _plane_transitions(t: Floats, psi: Floats) -> Floats:
-    h = np.diff(t)
-    x, y, u, v, udot, vdot = range(6)
-    half_square = 0.5 * h**2
-    cosine = _midpoints(np.cos(psi))
-    sine = _midpoints(np.sin(psi))
-    transitions = np.tile(np.eye(6), (len(h), 1, 1))
-    parts = [
-        (x, u, udot, cosine),
-        (x, v, vdot, -sine),
-        (y, u, udot, sine),
-        (y, v, vdot, cosine),
-    ]
-    for position, velocity, acceleration, part in parts:
-        transitions[:, position, velocity] = h * part
-        transitions[:, position, acceleration] = half_square * part
-    transitions[:, u, udot] = h
-    transitions[:, v, vdot] = h
-    return transitions
-
-
-def _midpoints(values: Floats) -> Floats:
-    """Means of each value and the next."""
-    return 0.5 * (values[1:] + values[:-1])
-
-
-def _smoothed(
-    trial: Trial, names: Sequence[str], motion: RandomWalkMotion
-) -> dict[str, Floats]:
+def _smoothed(trial: Trial, names: Sequence[str], motion: Motion) -> dict[str, Floats]:
     """States of the motion by the recorded channels.
 
     The roughness is that of greatest likelihood on the first samples.
     """
     measured = np.column_stack([trial[name] for name in names])
-    unit = _unit_system(trial, names, motion)
+    places = [motion.states.index(name) for name in names]
+    noise = np.array([_least_noise(trial, name) for name in names])
     guess = _guessed_roughness(trial, motion)
 
-    def system(decade: float, n_samples: int) -> LinearSystem:
-        steps = slice(n_samples - 1)
+    def filtered(decade: float, n_samples: int) -> _Filtered:
         roughness = guess * 10.0**decade
-        return replace(
-            unit,
-            transitions=unit.transitions[steps],
-            process=roughness * unit.process[steps],
-        )
+        return _filter(motion, roughness, measured[:n_samples], places, noise**2)
 
     longest = 500  # samples, which are enough
-
-    def unlikelihood(decade: float) -> float:
-        first = measured[:longest]
-        filtered = system(decade, len(first)).filtered(first)
-        return -filtered.log_likelihood
-
     decades = 4.0  # to either side of the first guess of the roughness
     best = minimize_scalar(
-        unlikelihood,
+        lambda decade: -filtered(decade, longest).log_likelihood,
         bounds=(-decades, decades),
         method="bounded",
         options={"xatol": 0.1},
     )
-    states = system(float(best.x), len(trial)).smoothed(measured)
-    return dict(zip(motion.states, states.T, strict=True))
+    found = filtered(float(best.x), len(trial))
+    return dict(zip(motion.states, _smoother(motion, found).T, strict=True))
 
 
-def _unit_system(
-    trial: Trial, names: Sequence[str], motion: RandomWalkMotion
-) -> LinearSystem:
-    """The motion of unit roughness, of which the named channels are measured."""
-    recorded = [motion.states.index(name) for name in names]
+class _Filtered(NamedTuple):
+    """States by the measurements up to each sample, before and after its own.
+
+    Shapes (n_samples, n_states), and of covariances (n_samples, n_states, n_states).
+    """
+
+    predicted: Floats
+    predicted_covariances: Floats
+    states: Floats
+    covariances: Floats
+    log_likelihood: float  # of the measurements, but for a constant
+
+
+def _filter(
+    motion: Motion,
+    roughness: float,
+    measured: Floats,
+    places: Sequence[int],
+    variances: Floats,
+) -> _Filtered:
+    """Kalman filter; measurements are taken in one at a time, in Joseph's form.
+
+    `places`: of the channels measured, shape (n_samples, n_channels), among the states.
+    """
     n_states = len(motion.states)
-    start = np.zeros(n_states)
-    start[recorded] = [trial[name][0] for name in names]
-    noise = np.array([_least_noise(trial, name) for name in names])
-    return LinearSystem(
-        transitions=motion.transitions,
-        process=motion.process,
-        observation=np.eye(n_states)[recorded],
-        variances=noise**2,
-        start=start,
-        start_variances=motion.start_variances,
-    )
+    found: list[tuple[Floats, Floats, Floats, Floats]] = []
+    x = np.zeros(n_states)
+    x[list(places)] = measured[0]
+    P = np.diag(motion.start_variances)
+    log_likelihood = 0.0
+    for k, sample in enumerate(measured):
+        if k > 0:
+            F = motion.transitions[k - 1]
+            x = F @ x
+            P = F @ P @ F.T + roughness * motion.process[k - 1]
+        predicted, predicted_covariance = x, P
+        for place, variance, y in zip(places, variances, sample, strict=True):
+            innovation = y - x[place]
+            innovation_variance = P[place, place] + variance
+            gain = P[:, place] / innovation_variance
+            x = x + gain * innovation
+            # Joseph's form keeps the matrix symmetric and positive
+            left = np.eye(n_states)
+            left[:, place] -= gain
+            P = left @ P @ left.T + variance * np.outer(gain, gain)
+            misfit = innovation**2 / innovation_variance
+            log_likelihood -= 0.5 * (np.log(innovation_variance) + misfit)
+        found.append((predicted, predicted_covariance, x, P))
+    arrays = [np.array(column) for column in zip(*found, strict=True)]
+    return _Filtered(*arrays, log_likelihood=float(log_likelihood))
 
 
-def _guessed_roughness(trial: Trial, motion: RandomWalkMotion) -> float:
+def _smoother(motion: Motion, found: _Filtered) -> Floats:
+    """States by all measurements, shape (n_samples, n_states).
+
+    Source: Rauch, Tung & Striebel 1965, AIAA Journal 3(8).
+    """
+    states = found.states.copy()
+    for k in reversed(range(len(states) - 1)):
+        moved = motion.transitions[k] @ found.covariances[k]
+        gain = np.linalg.solve(found.predicted_covariances[k + 1], moved).T
+        surprise = states[k + 1] - found.predicted[k + 1]
+        states[k] += gain @ surprise
+    return states
+
+
+def _guessed_roughness(trial: Trial, motion: Motion) -> float:
     """Roughness as if velocity changed by its range in a twentieth of the trial."""
     recorded = _recorded(trial, motion.guessed_by)
     first, *_ = recorded.values()
@@ -221,9 +236,7 @@ def _guessed_roughness(trial: Trial, motion: RandomWalkMotion) -> float:
 
 def _least_noise(trial: Trial, name: str) -> float:
     """Standard deviation of a channel's noise, at least that of its resolution."""
-    # of the range of a channel: resolution, and channels without noise
-    least_noise = 1e-4
     values = trial[name]
-    resolution = least_noise * float(np.ptp(values))
+    resolution = 1e-4 * float(np.ptp(values))
     level = noise_level(trial.t, values)
     return max(level, resolution, 1e-9)
