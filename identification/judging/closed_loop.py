@@ -15,9 +15,8 @@ from identification.samples.prediction import with_start
 from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.manoeuvres.execution import reversals, rudder
-from shipgym.models.simulate import Conditions, Passage
-from shipgym.ships.manoeuvring_model import ManoeuvringModel
-from shipgym.ships.orders import checked_orders, two_commands
+from shipgym.models.simulate import Conditions, Passage, checked_orders
+from shipgym.ships.manoeuvring_model import ManoeuvringModel, two_commands
 
 
 class ZigzagLeg(NamedTuple):

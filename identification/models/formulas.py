@@ -17,7 +17,7 @@ import numpy as np
 
 from shipgym import InputError, Particulars
 from shipgym.arrays import Flags, Floats
-from shipgym.ships.prime_inertia import prime_inertia
+from shipgym.ships.particulars import prime_inertia
 from shipgym.ships.term_table import Structure
 from shipgym.ships.terms import Term
 

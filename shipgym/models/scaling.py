@@ -10,8 +10,7 @@ from shipgym.errors import InputError
 from shipgym.models.by_name import takes_name
 from shipgym.models.ship_model import ShipModel
 from shipgym.ships.envelope import Envelope
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.particulars_limits import LIMITS
+from shipgym.ships.particulars import LIMITS, Particulars
 from shipgym.ships.term_table import Structure
 
 

@@ -17,8 +17,11 @@ from shipgym.sea.conditions import Weather, as_weather
 from shipgym.sea.current_field import CurrentField
 from shipgym.sea.open_sea import OPEN_SEA, Sea
 from shipgym.sea.weather_column import weather_column
-from shipgym.ships.manoeuvring_model import ManoeuvringModel
-from shipgym.ships.orders import checked_orders, two_commands
+from shipgym.ships.manoeuvring_model import (
+    ManoeuvringModel,
+    check_units,
+    two_commands,
+)
 from shipgym.ships.term_table import Structure
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
@@ -140,6 +143,34 @@ def simulate(
     passage.run("simulate", states, two_commands(held), dt)
     commands = np.vstack([held, held[-1:]])
     return as_trial(model, dt, states, commands, kind)
+
+
+def checked_orders(model: ManoeuvringModel, commands: ArrayLike) -> Floats:
+    """Orders of shape (n_steps, n_command), within the limits of rudder and shaft.
+
+    A rudder ordered beyond its limit is brought to the limit, as its gear would do;
+    beyond a right angle it was meant in other units. InputError names the first row out
+    of range.
+    """
+    orders = np.asarray(commands, dtype=float)
+    names = model.command_names
+    n = len(names)
+    if orders.ndim != 2 or orders.shape[1] != n or len(orders) < 2:
+        listed = ", ".join(names)
+        raise InputError(
+            f"commands: expected shape (n_steps, {n}) for {listed},"
+            f" with at least 2 steps, got {orders.shape}"
+        )
+    check_units(model, orders)
+    if "n" in names and not model.turns_astern:
+        row = int(orders[:, names.index("n")].argmin())
+        if orders[row, names.index("n")] < 0.0:
+            raise InputError(
+                f"commands: row {row}: expected a shaft speed >= 0, because the"
+                " equations hold for a shaft ahead only, got"
+                f" {orders[row, names.index('n')]:g}"
+            )
+    return orders
 
 
 def orders(

@@ -4,8 +4,7 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.prime_inertia import prime_inertia
+from shipgym.ships.particulars import Particulars, prime_inertia
 from shipgym.ships.term_table import Structure
 
 

@@ -16,7 +16,6 @@ from shipgym.engine.compiled_ship import CompiledShip
 from shipgym.engine.motion import Ship
 from shipgym.errors import InputError
 from shipgym.ships.envelope import Envelope
-from shipgym.ships.orders import check_units, two_commands
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import get_dynamics, get_structure
@@ -364,3 +363,57 @@ def ship_of(
         water_depth=water_depth,
         scale_speed=p["speed"],
     )
+
+
+# ---- orders ------------------------------------------------------------
+
+
+def check_units(
+    model: ManoeuvringModel, orders: Floats, where: str = "commands"
+) -> None:
+    """Refuse orders, shape (n, n_command), not finite or not in rad and 1/s."""
+    names = model.command_names
+    wrong = np.argwhere(~np.isfinite(orders))
+    if len(wrong):
+        row, column = wrong[0].tolist()
+        raise InputError(
+            f"{where}: row {row}: expected finite numbers, got {orders[row, column]}"
+        )
+    if "delta" in names:
+        _check_within(
+            orders[:, names.index("delta")],
+            -np.pi / 2,
+            np.pi / 2,
+            "a rudder in rad (not degrees) between -pi/2 and pi/2",
+            where,
+        )
+    fastest_shaft = 5.0  # times the speed in service; beyond it the units are wrong
+    if "n" in names:
+        service = model.service_shaft_speed
+        most = fastest_shaft * service
+        least = -most if model.turns_astern else 0.0
+        _check_within(
+            orders[:, names.index("n")],
+            -most,
+            most,
+            f"a shaft speed in 1/s (not rpm) between {least:.4g} and {most:.4g},"
+            f" {service:.4g} at service speed",
+            where,
+        )
+
+
+def _check_within(
+    values: Floats, low: float, high: float, expected: str, where: str
+) -> None:
+    beyond = (values < low) | (values > high)
+    if beyond.any():
+        row = int(beyond.argmax())
+        value = values[row]
+        raise InputError(f"{where}: row {row}: expected {expected}, got {value:g}")
+
+
+def two_commands(commands: Floats) -> Floats:
+    """Rudder and shaft speed as loops take them, shape (n, 2); 0 without a shaft."""
+    two = np.zeros((len(commands), 2))
+    two[:, : commands.shape[1]] = commands
+    return two

@@ -9,17 +9,16 @@ accelerations, so that the mass to be accelerated follows from the coefficients.
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_number, check_table, check_text, quoted, unexpected
+from shipgym.checks import check_table, check_text, placed, unexpected
 from shipgym.errors import InputError
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.prime_inertia import total_inertia
+from shipgym.ships.particulars import Particulars, total_inertia
 from shipgym.ships.term_table import Structure
-from shipgym.ships.terms import Term, list_entries, short_terms
+from shipgym.ships.terms import Term, short_terms
 
 AXES = ("u", "v", "r")
 ACCELERATIONS = ("udot", "vdot", "rdot")
@@ -29,57 +28,17 @@ RR = Term("rr", (("r", 2),))
 UR = Term("ur", (("u", 1), ("r", 1)))
 
 
-@dataclass(frozen=True)
-class Share:
+class Share(NamedTuple):
     """Share of a coefficient in a force: sign times coefficient times term."""
 
     coefficient: str  # its name: `Y_vdot`
     term: Term  # of velocities, or one acceleration (`udot`, `vdot`, `rdot`)
-    sign: float = 1.0  # 1 or -1
-
-    def __post_init__(self) -> None:
-        where = f"share '{self.coefficient}'"
-        if self.acceleration is None:
-            self.term.check(where)
-            return
-        (_, power), *others = self.term.powers
-        if others or type(power) is not int or power != 1:
-            powers = dict(self.term.powers)
-            raise unexpected(where, "an acceleration alone", powers)
+    sign: float  # 1 or -1
 
     @property
     def acceleration(self) -> str | None:
         """The acceleration it is on, None for velocities."""
-        symbol = self.term.powers[0][0] if self.term.powers else ""
-        return symbol if symbol in ACCELERATIONS else None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Share as written in a model file."""
-        term = self.term.to_dict()
-        return {"coefficient": self.coefficient, **term, "sign": self.sign}
-
-    @classmethod
-    def from_dict(cls, content: Any, where: str) -> Self:
-        """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
-        fields = ("coefficient", "name", "powers", "sign")
-        table = check_table(
-            content,
-            where,
-            allowed=fields,
-            required=fields,
-        )
-        name_and_powers = {name: table[name] for name in ("name", "powers")}
-        sign = check_number(
-            table["sign"],
-            f"{where}.sign",
-            at_least=-1.0,
-            at_most=1.0,
-        )
-        return cls(
-            coefficient=check_text(table["coefficient"], f"{where}.coefficient"),
-            term=Term.from_dict(name_and_powers, where),
-            sign=sign,
-        )
+        return self.term.name if self.term.name in ACCELERATIONS else None
 
 
 @dataclass(frozen=True)
@@ -91,29 +50,16 @@ class SharedStructure(Structure):
     Make one by `shared_structure`.
     """
 
-    # what makes up X (`u`), Y (`v`) and N (`r`)
-    shares: Mapping[str, tuple[Share, ...]] = field(default_factory=dict)
+    # what makes up X (`u`), Y (`v`) and N (`r`), as `read_shares` reads it
+    texts: Mapping[str, str] = field(default_factory=dict)
     # its added masses are among the unknowns, which only measured forces tell from the
     # mass
     captive: ClassVar[bool] = True
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        where = f"structure '{self.name}'"
-        if tuple(self.shares) != AXES:
-            raise InputError(
-                f"{where}: expected shares of {quoted(AXES)}, got {quoted(self.shares)}"
-            )
-        for axis, shares in self.shares.items():
-            allowed = ("udot",) if axis == "u" else ("vdot", "rdot")
-            for share in shares:
-                acceleration = share.acceleration
-                if acceleration is not None and acceleration not in allowed:
-                    raise InputError(
-                        f"{where}: expected 'udot' in the equation of surge, 'vdot' and"
-                        f" 'rdot' in those of sway and yaw, got '{acceleration}' in the"
-                        f" equation of '{axis}'"
-                    )
+    @cached_property
+    def shares(self) -> dict[str, tuple[Share, ...]]:
+        """Shares of X (`u`), Y (`v`) and N (`r`)."""
+        return {axis: read_shares(text) for axis, text in self.texts.items()}
 
     @cached_property
     def coefficient_names(self) -> tuple[str, ...]:
@@ -193,36 +139,20 @@ class SharedStructure(Structure):
 
     def to_dict(self) -> dict[str, Any]:
         """Table as written in a model file."""
-        shares = {}
-        for axis, listed in self.shares.items():
-            shares[axis] = [share.to_dict() for share in listed]
         return {
             "name": self.name,
             "source": self.source,
-            "shares": shares,
+            "shares": dict(self.texts),
         }
 
     @classmethod
     def from_dict(cls, table: Mapping[str, Any], where: str = "structure") -> Self:
         """Read what `to_dict` wrote; errors begin with `where`."""
         place = f"{where}.shares"
-        listed = check_table(
-            table["shares"],
-            place,
-            allowed=AXES,
-            required=AXES,
-        )
-        shares: dict[str, tuple[Share, ...]] = {}
-        for axis in AXES:
-            shares[axis] = ()
-            entries = list_entries(listed[axis], f"{place}.{axis}")
-            for at, entry in entries.items():
-                shares[axis] += (Share.from_dict(entry, at),)
-        fields = _shared_fields(
-            name=table.get("name"),
-            source=table.get("source"),
-            shares=shares,
-        )
+        given = check_table(table["shares"], place, allowed=AXES, required=AXES)
+        texts = {axis: check_text(given[axis], f"{place}.{axis}") for axis in AXES}
+        with placed(place):
+            fields = _fields(table.get("name"), table.get("source"), texts)
         return cls(**fields)
 
 
@@ -239,20 +169,26 @@ def _centripetal(axis: str, p: Particulars) -> dict[Term, float]:
 
 
 def shared_structure(
-    name: str, source: str, shares: Mapping[str, tuple[Share, ...]]
+    name: str, source: str, texts: Mapping[str, str]
 ) -> SharedStructure:
     """Make a table for forces from the shares of equations `u`, `v` and `r`."""
-    return SharedStructure(**_shared_fields(name, source, shares))
+    return SharedStructure(**_fields(name, source, texts))
 
 
-def _shared_fields(
-    name: Any, source: Any, shares: Mapping[str, tuple[Share, ...]]
-) -> dict[str, Any]:
+def _fields(name: Any, source: Any, texts: Mapping[str, str]) -> dict[str, Any]:
     """Fields of a `SharedStructure`: its equations follow from the shares."""
-    on_velocities = {}
+    on_velocities: dict[str, list[Term]] = {}
     for axis in AXES:
-        listed = shares.get(axis, ())
-        on_velocities[axis] = [s.term for s in listed if s.acceleration is None]
+        on_velocities[axis] = []
+        allowed = ("udot",) if axis == "u" else ("vdot", "rdot")
+        for share in read_shares(texts[axis]):
+            if share.acceleration is None:
+                on_velocities[axis].append(share.term)
+            elif share.acceleration not in allowed:
+                raise InputError(
+                    f"{axis}: expected 'udot' in the equation of surge, 'vdot' and"
+                    f" 'rdot' in those of sway and yaw, got '{share.acceleration}'"
+                )
     surge = _distinct([*on_velocities["u"], VR, RR])
     across = _distinct([*on_velocities["v"], *on_velocities["r"], UR])
     return {
@@ -261,7 +197,7 @@ def _shared_fields(
         "equations": {"u": surge, "v": across, "r": across},
         "normalisation": "prime",
         "quantity": "force",
-        "shares": dict(shares),
+        "texts": dict(texts),
     }
 
 
@@ -285,13 +221,13 @@ def read_shares(text: str) -> tuple[Share, ...]:
     for word in text.split():
         sign = -1.0 if word.startswith("-") else 1.0
         coefficient, _, name = word.removeprefix("-").partition(":")
+        name = name or coefficient.partition("_")[2]
         if not name:
-            _, name = coefficient.split("_", maxsplit=1)
-        if name in ACCELERATIONS:
-            powers = ((name, 1),)
-            term = Term(name, powers)
-        else:
+            raise unexpected("shares", "words such as 'Y_vdot:vr'", word)
+        term = Term(name, ((name, 1),))
+        if name not in ACCELERATIONS:
             (term,) = short_terms(name, surge="u")
+            term.check("shares")
         share = Share(coefficient, term, sign)
         shares.append(share)
     return tuple(shares)

@@ -14,20 +14,16 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_table
+from shipgym.checks import check_choice, check_table, check_text, quoted
 from shipgym.engine.compiled_ship import CompiledShip, compiled_ship
 from shipgym.engine.motion import Ship
 from shipgym.errors import InputError
 from shipgym.ships import term_functions
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.prime_inertia import prime_inertia
-from shipgym.ships.term_checks import (
-    ACCELERATION_OF_EQUATION,
-    EQUATION_NAMES,
-    check_structure,
-)
+from shipgym.ships.particulars import Particulars, prime_inertia
 from shipgym.ships.terms import (
     CHANNEL,
+    MOST_TERMS,
+    ROLL,
     SHAFT_SPEEDS,
     SPEEDS,
     SYMBOLS,
@@ -37,6 +33,11 @@ from shipgym.ships.terms import (
     symbols_in,
 )
 
+#: Equations in their order, with the first letter of the names of accelerations'
+#: coefficients: as Zhu 2018 has them for surge, sway and yaw; roll, and the memory of
+#: yaw, go on from there.
+ACCELERATION_OF_EQUATION = {"u": "a", "v": "b", "r": "c", "p": "d", "q": "e"}
+EQUATION_NAMES = tuple(ACCELERATION_OF_EQUATION)
 FORCE_OF_EQUATION = {"u": "X", "v": "Y", "r": "N"}
 ANGULAR = ("r", "p", "q")  # of these the unit holds 1 / length once more
 MEASURED = ("u", "v", "r", "p", "phi", "delta", "n")  # channels of a trial
@@ -78,9 +79,7 @@ class Structure:
     shallow_water: ClassVar[bool] = False  # whether it knows the depth of the water
 
     def __post_init__(self) -> None:
-        check_structure(
-            self.name, self.source, self.equations, self.normalisation, self.quantity
-        )
+        _check_structure(self)
 
     # ---- contents of the table -------------------------------------------------------
 
@@ -450,3 +449,84 @@ def structure_fields(table: Mapping[str, Any], where: str) -> dict[str, Any]:
         if key in table:
             fields[key] = table[key]
     return fields
+
+
+# ---- what a table can compute ------------------------------
+
+
+def _check_structure(table: Structure) -> None:
+    """Refuse names, units, equations or terms that cannot be computed."""
+    equations = table.equations
+    where = f"structure '{table.name}'"
+    check_text(table.name, "structure: name")
+    check_text(table.source, f"{where}: source")
+    check_choice(
+        table.normalisation, ("prime", "service", "si"), f"{where}: normalisation"
+    )
+    check_choice(table.quantity, ("force", "acceleration"), f"{where}: quantity")
+    known = [equation for equation in EQUATION_NAMES if equation in equations]
+    if not known or list(equations) != known:
+        raise InputError(
+            f"{where}: expected equations, some of {quoted(EQUATION_NAMES)} in this"
+            f" order, got {quoted(equations)}"
+        )
+    for equation, terms in equations.items():
+        _check_terms(terms, table.normalisation, f"{where}: equations.{equation}")
+    has_roll = not symbols_in(equations.values()).isdisjoint(ROLL)
+    if has_roll and "p" not in equations:
+        raise InputError(
+            f"{where}: expected an equation of roll 'p' where terms have roll, got"
+            " none; give its terms, or leave roll out"
+        )
+    if "q" in equations and ("r" not in equations or "p" in equations):
+        raise InputError(
+            f"{where}: expected the memory 'q' of yaw with an equation 'r' and without"
+            f" one of roll 'p', got equations {quoted(equations)}"
+        )
+    if table.quantity == "force":
+        _check_forces(table, where)
+
+
+def _check_terms(terms: tuple[Term, ...], normalisation: str, where: str) -> None:
+    if not 1 <= len(terms) <= MOST_TERMS:
+        raise InputError(
+            f"{where}: expected 1 to {MOST_TERMS} terms, got {len(terms) or 'none'}"
+        )
+    seen: set[object] = set()
+    for term in terms:
+        term.check(where)
+        if normalisation == "prime" and term.power("U"):
+            raise InputError(
+                f"{where}: term '{term.name}': expected no 'U', which is 1 in the prime"
+                " system; leave it out, or choose the 'service' or 'si'"
+                " normalisation"
+            )
+        if term.name in seen or term.product in seen:
+            raise InputError(
+                f"{where}: expected each term once, got '{term.name}' twice"
+            )
+        seen |= {term.name, term.product}
+
+
+def _check_forces(table: Structure, where: str) -> None:
+    equations = table.equations
+    if "p" in equations or "q" in equations:
+        raise InputError(
+            f"{where}: expected accelerations in a table with roll 'p' or memory 'q',"
+            " got forces"
+        )
+    if table.normalisation == "si":
+        raise InputError(
+            f"{where}: expected forces in the 'prime' or 'service' normalisation, got"
+            " 'si'"
+        )
+    if "v" not in equations or "r" not in equations:
+        return
+    sway = [term.powers for term in equations["v"]]
+    yaw = [term.powers for term in equations["r"]]
+    if sway != yaw:
+        raise InputError(
+            f"{where}: expected the same terms in the same order in 'v' and 'r',"
+            " because inertia couples the two forces, got others; make them the same,"
+            " or write accelerations"
+        )

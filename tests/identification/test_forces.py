@@ -17,7 +17,7 @@ from identification.models.forces import (
     identify_forces,
 )
 from shipgym import InputError, Particulars, ShipModel, Trial
-from shipgym.ships.shared_structure import read_shares, shared_structure
+from shipgym.ships.shared_structure import shared_structure
 
 # a stand-in for what the paper does not print: a coaster's mass
 PARTICULARS = Particulars(
@@ -95,8 +95,7 @@ def test_the_models_have_the_coefficients_of_the_paper() -> None:
 
 def test_each_term_stands_once_and_before_those_of_the_mass() -> None:
     named = {"u": "X_uuu -Y_vdot:vr X_uvv", "v": "Y_v Y_uv", "r": "N_r Y_v"}
-    shares = {axis: read_shares(text) for axis, text in named.items()}
-    table = shared_structure("mine", "own", shares)
+    table = shared_structure("mine", "own", named)
     assert [term.name for term in table.terms("u")] == ["uuu", "uvv", "vr", "rr"]
     assert sorted(term.name for term in table.terms("r")) == ["r", "ur", "uv", "v"]
     assert table.terms("v") == table.terms("r")
