@@ -1,6 +1,6 @@
 """Episodes of course keeping and step responses of one controller on many ships."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -26,14 +26,12 @@ RECORDED = ("psi", "delta", "set_point", *course_keeping_task().info_names)
 
 @dataclass(frozen=True, eq=False)
 class Episodes:
-    """Costs of episodes of course keeping, each array of the shape of the seeds.
+    """Episodes of course keeping, each array of the shape of the seeds.
 
     Attributes
     ----------
     cost : array
         Steering cost of the episode.
-    heading_cost, rudder_cost, rudder_rate_cost, end_cost : array
-        Its parts; the last is the cost of losing control.
     heading_rmse_deg : array
         Root mean square of the heading error, degrees.
     rudder_travel_deg_min : array
@@ -51,10 +49,6 @@ class Episodes:
     """
 
     cost: Floats
-    heading_cost: Floats
-    rudder_cost: Floats
-    rudder_rate_cost: Floats
-    end_cost: Floats
     heading_rmse_deg: Floats
     rudder_travel_deg_min: Floats
     extrapolating: Floats
@@ -116,44 +110,35 @@ def sail(
     asked = task or course_keeping_task()
     check_fits(controller, asked, ships[0], f"model '{ships[0].name}'")
 
+    flat = numbers.ravel()
+    owners = np.arange(flat.size) // (flat.size // len(ships))  # ship of each episode
+    at_once = 1024  # recordings of so many take little memory
     groups = []
-    for group in _groups(ships, numbers):
-        engine = Engine(
-            group.ships,
-            len(group.seeds),
-            asked,
-            allow_unstable=allow_unstable,
-        )
-        run = rollout(controller, engine, group.seeds, record=RECORDED)
+    for first in range(0, flat.size, at_once):
+        some = slice(first, first + at_once)
+        own = [ships[owner] for owner in owners[some]] if len(ships) > 1 else ships
+        engine = Engine(own, len(flat[some]), asked, allow_unstable=allow_unstable)
+        run = rollout(controller, engine, flat[some], record=RECORDED)
         groups.append(_figures(run))
 
     figures = {}
     for name in groups[0]:
-        of_groups = [group_figures[name] for group_figures in groups]
-        values = np.concatenate(of_groups)
+        values = np.concatenate([group[name] for group in groups])
         figures[name] = values.reshape(numbers.shape)
     return Episodes(**figures, seeds=numbers)
 
 
-class _Group(NamedTuple):
-    """Episodes that are sailed together."""
-
-    ships: list[ShipModel]  # one of all episodes, or one of each
-    seeds: Integers
-
-
-def _groups(ships: list[ShipModel], seeds: Integers) -> Iterator[_Group]:
-    """Groups of episodes whose recordings fit into little memory."""
-    flat = seeds.ravel()
-    per_ship = len(flat) // len(ships)
-    at_once = 1024
-    for first in range(0, len(flat), at_once):
-        some = flat[first : first + at_once]
-        own_ships = ships
-        if len(ships) > 1:
-            lanes = first + np.arange(len(some))
-            own_ships = [ships[lane // per_ship] for lane in lanes]
-        yield _Group(own_ships, some)
+def _figures(run: Rollout) -> dict[str, NDArray[np.generic]]:
+    """Figures of `Episodes`, each of shape (n,)."""
+    steered = steering(run)
+    return {
+        "cost": costs(run)["cost"],
+        "heading_rmse_deg": steered["heading_rmse_deg"],
+        "rudder_travel_deg_min": steered["rudder_travel_deg_min"],
+        "extrapolating": mean(run, "extrapolating"),
+        "terminated": run.terminated,
+        "duration_s": run.steps * run.dt,
+    }
 
 
 def _seeds(seeds: ArrayLike, n_models: int) -> Integers:
@@ -171,24 +156,6 @@ def _seeds(seeds: ArrayLike, n_models: int) -> Integers:
             f" for each model, got {numbers.shape}"
         )
     return numbers
-
-
-def _figures(run: Rollout) -> dict[str, NDArray[np.generic]]:
-    """Figures of `Episodes`, each of shape (n,)."""
-    cost = costs(run)
-    steered = steering(run)
-    return {
-        "cost": cost["cost"],
-        "heading_cost": cost["cost_heading"],
-        "rudder_cost": cost["cost_rudder"],
-        "rudder_rate_cost": cost["cost_rudder_rate"],
-        "end_cost": cost["cost_end"],
-        "heading_rmse_deg": steered["heading_rmse_deg"],
-        "rudder_travel_deg_min": steered["rudder_travel_deg_min"],
-        "extrapolating": mean(run, "extrapolating"),
-        "terminated": run.terminated,
-        "duration_s": run.steps * run.dt,
-    }
 
 
 def step_response(

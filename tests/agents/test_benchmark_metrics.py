@@ -50,9 +50,6 @@ def test_costs_and_errors_are_those_of_course_keeping(lq):
     alone = sail(lq, KEEPING.ship, KEEPING.task, SEEDS)
     np.testing.assert_allclose(found["cost"], alone.cost, rtol=1e-14)
     np.testing.assert_allclose(
-        found["cost_rudder_rate"], alone.rudder_rate_cost, rtol=1e-14
-    )
-    np.testing.assert_allclose(
         found["heading_rmse_deg"], alone.heading_rmse_deg, rtol=1e-14
     )
     np.testing.assert_allclose(

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -76,20 +77,9 @@ def test_seeds_give_the_results_their_shape():
     ]
 
 
-def test_costs_add_up_and_are_those_of_the_environment():
-    import gymnasium as gym
-
-    episodes = sail(PILOT, MARINER, SHORT, seeds=np.arange(5))
-    parts = (
-        episodes.heading_cost
-        + episodes.rudder_cost
-        + episodes.rudder_rate_cost
-        + episodes.end_cost
-    )
-    np.testing.assert_allclose(episodes.cost, parts)
-    assert np.all(episodes.duration_s == 150.0)
+def test_costs_are_those_of_the_environment():
     assert sail(PILOT, MARINER, SHORT.changed(dt=0.5), seeds=0).duration_s == 75.0
-    env = gym.make("shipgym/CourseKeeping-v0", model=MARINER, episode_steps=150)
+    env = gymnasium.make("shipgym/CourseKeeping-v0", model=MARINER, episode_steps=150)
     observation, _ = env.reset(seed=0)
     cost, errors, over = 0.0, [], False
     while not over:
@@ -120,14 +110,14 @@ def test_a_lost_ship_is_counted_and_pays_for_the_rest_of_the_episode():
     assert episodes.cost[0] == episodes.cost[2] < 0.05 * episodes.cost[1]
     remaining = 150.0 - episodes.duration_s[1]
     assert 0.0 < remaining < 150.0
-    assert episodes.end_cost.tolist() == pytest.approx([0.0, 9.0 * remaining, 0.0])
+    assert episodes.cost[1] > 9.0 * remaining
 
 
 def test_a_ship_without_a_helmsman_costs_its_heading_error():
     task = course_keeping_task(episode_steps=100, course_change_deg=0.0)
     episodes = sail(AMIDSHIPS, MARINER, task, seeds=[0])
     assert episodes.rudder_travel_deg_min[0] == 0.0
-    assert episodes.cost[0] == episodes.heading_cost[0] > 0.0
+    assert episodes.cost[0] > 0.0
     assert episodes.extrapolating[0] == 0.0
 
 
