@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -73,7 +73,6 @@ def rollout(
     engine: Engine,
     seeds: ArrayLike,
     *,
-    number: int = 0,
     record: bool | Collection[str] = False,
     tolerant: bool = False,
     show: Callable[[NDArray[np.float32]], NDArray[np.float32]] | None = None,
@@ -91,9 +90,6 @@ def rollout(
         With a lane for each seed.
     seeds : array-like of int, shape (n,)
         Of the episodes.
-    number : int
-        Number of the episodes under their seeds: a lane that sails on has them one
-        after another.
     record : bool or collection of str
         Names of physical states and of entries of `info` to record; True for all.
     tolerant : bool
@@ -106,7 +102,7 @@ def rollout(
     """
     log = _Log(engine, record)
     helmsman = _Helmsman(policy, tolerant)
-    observations = engine.begin(episode_keys(seeds), number)
+    observations = engine.begin(episode_keys(seeds), 0)
     log.look()
 
     starts = log.sailing
@@ -114,12 +110,14 @@ def rollout(
         seen = observations
         if show is not None:
             seen = show(observations)
-        command = helmsman.steer(seen, starts, log.sailing, engine)
-        log.give_up(command.missing)
+        commands, missing = helmsman.steer(
+            seen, starts, log.sailing, len(engine.command)
+        )
+        log.give_up(missing)
         if not log.sailing.any():  # the policy has failed in all episodes
             break
-        observations, _, terminated, truncated = engine.step(command.values)
-        log.note(command.values, terminated, truncated)
+        observations, _, terminated, truncated = engine.step(commands)
+        log.note(commands, terminated, truncated)
         starts = np.zeros_like(starts)
     return log.rollout(np.asarray(seeds), helmsman)
 
@@ -127,14 +125,6 @@ def rollout(
 def episode_costs(policy: Policy, engine: Engine, seeds: NDArray[np.int64]) -> Floats:
     """Steering cost of each episode, shape (n,); see `rollout`."""
     return rollout(policy, engine, seeds).costs
-
-
-class _Command(NamedTuple):
-    """Answer of a policy for all ships."""
-
-    values: NDArray[np.float32]  # shape (n, n_commands); 0 for ships that do not sail
-    missing: Flags  # ships that sail without a command
-    fault: str  # what is wrong with the answer; empty if nothing
 
 
 class _Helmsman:
@@ -150,68 +140,63 @@ class _Helmsman:
         self.n_commands = 0
 
     def steer(
-        self, seen: Any, starts: Flags, sailing: Flags, engine: Engine
-    ) -> _Command:
-        """Commands for what is seen; InputError for a failure that is not tolerated."""
+        self, seen: Any, starts: Flags, sailing: Flags, n_commands: int
+    ) -> tuple[NDArray[np.float32], Flags]:
+        """Commands of shape (n, n_commands), and the ships that sail without one.
+
+        They are 0 for ships that do not sail. Raises InputError for a failure that is
+        not tolerated.
+        """
         where = f"step {self.n_calls}"
         self.n_calls += 1
         self.n_commands += int(sailing.sum())
-
-        actions, error = self._answer(seen, starts)
-        shape = (engine.num_envs, len(engine.command))
-        command = _checked_command(actions, shape, sailing)
-        if not command.fault:
-            return command
-
-        if not self.tolerant:
-            name = type(self.policy).__name__
-            raise InputError(f"{name}.predict: {where}: {command.fault}")
-        if not self.failure:
-            self.failure = f"{where}: {error or command.fault}"
-        return command
-
-    def _answer(self, seen: Any, starts: Flags) -> tuple[Any, str]:
-        """Actions, None after an error that is tolerated, and this error."""
-        actions = None
-        failure = ""
+        values = np.zeros((len(sailing), n_commands), dtype=np.float32)
+        missing = sailing
+        fault = ""
         began = time.process_time()
         try:
             actions, self.memory = self.policy.predict(seen, self.memory, starts, True)
         except Exception as error:  # whatever a user's policy raises
             if not self.tolerant:
                 raise
-            failure = f"{type(error).__name__}: {error}"
+            fault = f"{type(error).__name__}: {error}"
         self.seconds += time.process_time() - began
-        return actions, failure
+        if not fault:
+            given, fault = _numbers(actions, values.shape)
+            missing = sailing & ~np.isfinite(given).all(axis=1)
+            values = np.where((sailing & ~missing)[:, None], given, values)
+            fault = fault or _no_number(given, missing, sailing)
+
+        if fault and not self.tolerant:
+            raise InputError(f"{type(self.policy).__name__}.predict: {where}: {fault}")
+        if fault and not self.failure:
+            self.failure = f"{where}: {fault}"
+        return values, missing
 
 
-def _checked_command(actions: Any, shape: tuple[int, int], sailing: Flags) -> _Command:
-    """Command from what a policy returned."""
-    nothing = _Command(np.zeros(shape, dtype=np.float32), sailing, "")
+def _numbers(actions: Any, shape: tuple[int, int]) -> tuple[NDArray[np.float32], str]:
+    """What a policy returned as numbers, else NaN, and what is wrong with it."""
+    nothing = np.full(shape, np.nan, dtype=np.float32)
     try:
         with np.errstate(over="ignore"):
             values = np.array(actions, dtype=np.float32)
     except (TypeError, ValueError):
-        fault = f"expected an array of numbers, got {type(actions).__name__}"
-        return nothing._replace(fault=fault)
+        return nothing, f"expected an array of numbers, got {type(actions).__name__}"
     if values.shape != shape:
-        fault = f"expected actions of shape {shape}, got {values.shape}"
-        return nothing._replace(fault=fault)
+        return nothing, f"expected actions of shape {shape}, got {values.shape}"
+    return values, ""
 
-    is_finite = np.isfinite(values).all(axis=1)
-    missing = sailing & ~is_finite
-    fault = ""
-    if missing.any():
-        first = int(np.argmax(missing))
-        n_missing = missing.sum()
-        n_sailing = sailing.sum()
-        fault = (
-            f"expected numbers in [-1, 1], got {values[first]} for ship {first}: no"
-            f" finite number for {n_missing} of {n_sailing} ships; look for a"
-            " division by zero in the controller"
-        )
-    values[missing | ~sailing] = 0.0
-    return _Command(values, missing, fault)
+
+def _no_number(values: NDArray[np.float32], missing: Flags, sailing: Flags) -> str:
+    """What is wrong with commands that are not finite; empty if all are."""
+    if not missing.any():
+        return ""
+    first = int(np.argmax(missing))
+    return (
+        f"expected numbers in [-1, 1], got {values[first]} for ship {first}: no finite"
+        f" number for {missing.sum()} of {sailing.sum()} ships; look for a division by"
+        " zero in the controller"
+    )
 
 
 class _Log:

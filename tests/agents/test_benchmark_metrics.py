@@ -76,33 +76,6 @@ def test_the_worst_step_is_what_the_tasks_charge_for_the_rest(task):
     )
 
 
-def test_straight_running_needs_the_fuel_of_straight_running():
-    calm = BenchmarkTask(
-        "calm",
-        "course-keeping",
-        "kvlcc2",
-        options={"course_change_deg": 0.0, "episode_steps": 100},
-    )
-    found = evaluate(LQ.from_model(calm.ship), calm, SEEDS[:2]).figures
-    np.testing.assert_allclose(found["fuel"], 1.0, atol=2e-3)
-
-
-def test_fuel_goes_by_the_cube_of_the_shaft_over_the_way():
-    """With the shaft ordered to half its speed: by the mean of its cube and the speed
-    that is left."""
-    options = {"course_change_deg": 0.0, "episode_steps": 300, "action": "rudder-shaft"}
-    slow = BenchmarkTask("slow", "course-keeping", "tanker", options=options)
-    orders = np.array([[0.0, 0.5]], dtype=np.float32)
-    found = evaluate(
-        Steers(lambda call, seen: np.repeat(orders, len(seen), axis=0)), slow, SEEDS[:2]
-    )
-    shaft, speed = found.run.states["n"][1:], found.run.states["u"][1:]
-    power = np.mean((shaft / slow.ship.service_shaft_speed) ** 3, axis=0)
-    expected = power * slow.ship.particulars["speed"] / speed.mean(axis=0)
-    np.testing.assert_allclose(found.figures["fuel"], expected, rtol=5e-3)
-    assert shaft[-1] == pytest.approx(0.5 * slow.ship.service_shaft_speed, rel=0.02)
-
-
 def made_up(task, way=None, **states):
     """Two episodes of 3 and 1 intervals of 10 s of a ship of 5 m/s and 2 1/s; later
     nothing counts."""
@@ -261,13 +234,3 @@ def test_a_controller_that_fails_is_charged_for_the_rest_and_the_others_go_on(ho
     assert (
         found.run.actions[~found.run.sailing] == 0.0
     ).all()  # what is over is not steered
-
-
-def test_a_controller_that_fails_at_once_has_a_cost_and_no_figures():
-    found = evaluate(Steers(lambda call, seen: None), KEEPING, SEEDS[:2])
-    assert found.figures["failed"].all()
-    np.testing.assert_allclose(
-        found.figures["cost"], 250 * worst_step_cost(KEEPING.task)
-    )
-    for name in ("heading_rmse_deg", "fuel"):
-        assert np.isnan(found.figures[name]).all(), name

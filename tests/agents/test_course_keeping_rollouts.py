@@ -27,9 +27,6 @@ class Helmsman:
         return self.answer(len(observation)), state
 
 
-AMIDSHIPS = Helmsman(lambda n: np.zeros((n, 1)))
-
-
 def with_yaw(factors):
     """The Mariner with other yaw coefficients."""
     coefficients = dict(MARINER.coefficients)
@@ -96,14 +93,6 @@ def test_costs_are_those_of_the_environment():
     )
 
 
-@pytest.mark.parametrize("bounded", [False, 0.5])
-def test_the_cost_does_not_depend_on_the_reward(bounded):
-    costs = []
-    for task in (SHORT, SHORT.changed(bounded=bounded)):
-        costs.append(sail(PILOT, [MARINER, TURNED], task, seeds=[1, 1]).cost)
-    np.testing.assert_array_equal(*costs)
-
-
 def test_a_lost_ship_is_counted_and_pays_for_the_rest_of_the_episode():
     episodes = sail(PILOT, [MARINER, TURNED, MARINER], SHORT, seeds=[1, 1, 1])
     assert episodes.terminated.tolist() == [False, True, False]
@@ -111,14 +100,6 @@ def test_a_lost_ship_is_counted_and_pays_for_the_rest_of_the_episode():
     remaining = 150.0 - episodes.duration_s[1]
     assert 0.0 < remaining < 150.0
     assert episodes.cost[1] > 9.0 * remaining
-
-
-def test_a_ship_without_a_helmsman_costs_its_heading_error():
-    task = course_keeping_task(episode_steps=100, course_change_deg=0.0)
-    episodes = sail(AMIDSHIPS, MARINER, task, seeds=[0])
-    assert episodes.rudder_travel_deg_min[0] == 0.0
-    assert episodes.cost[0] > 0.0
-    assert episodes.extrapolating[0] == 0.0
 
 
 def test_step_responses_of_many_ships_are_those_of_each():

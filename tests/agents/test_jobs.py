@@ -1,10 +1,7 @@
 """Jobs give the same results wherever they run, are kept, and fail with one message."""
 
-import json
-import math
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -15,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents.job_results import KeptResults, result_from_json, result_to_json
+from agents.job_results import result_to_json
 from agents.jobs import EngineError, JobEngine, JobError, run_jobs
 from shipgym.errors import InputError
 
@@ -130,14 +127,6 @@ def test_workers_give_the_same_and_import_nothing_from_the_working_folder(
         assert folder == str(tmp_path)
 
 
-def test_progress_counts_equal_jobs_each(functions):
-    calls = []
-    run_jobs(
-        functions.spectrum, [{"seed": 1}] * 3, progress=lambda *call: calls.append(call)
-    )
-    assert calls == [(0, 3), (3, 3)]
-
-
 def test_a_killed_worker_is_one_message_and_finished_jobs_are_kept(functions, tmp_path):
     jobs = [{"k": k} for k in range(3)]
     engine = JobEngine(workers=2, keep=tmp_path / "kept")
@@ -171,22 +160,6 @@ def test_a_kept_result_is_not_computed_again_unless_its_file_is_broken(
     assert calls == [(2, 4), (3, 4), (4, 4)]
     assert len(log.read_text().split()) == 5
     assert len(list(kept.iterdir())) == 4
-
-
-def test_a_kept_result_belongs_to_its_function_and_version(functions, tmp_path):
-    job = json.dumps({"k": 2})
-    KeptResults(tmp_path / "kept", functions.divides).save(job, "0.5")
-    assert KeptResults(tmp_path / "kept", functions.divides).load(job) == "0.5"
-    assert KeptResults(tmp_path / "kept", functions.logged).load(job) is None
-    (file,) = (tmp_path / "kept").iterdir()
-    content = json.loads(file.read_text())
-    old = content["key"] | {"shipgym": "0.0.1"}
-    for change in ({"key": old}, {"result": '{"__array__": 1, "dtype": "O"}'}):
-        file.write_text(json.dumps(content | change))
-        assert KeptResults(tmp_path / "kept", functions.divides).load(job) is None
-    (tmp_path / "file").touch()
-    with pytest.raises(InputError, match="file: expected a folder for results"):
-        KeptResults(tmp_path / "file", functions.divides)
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -235,24 +208,10 @@ def test_workers_end_with_the_process_that_started_them(functions, tmp_path, num
 
 
 @pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"engine": "rai"}, "engine: .*Did you mean 'ray'"),
-        ({"workers": 0}, "workers: .*at least 1"),
-        ({"address": "10.0.0.1:6379"}, "it is for engine 'ray'"),
-    ],
-)
-def test_wrong_fields_of_an_engine_are_refused(fields, message):
-    with pytest.raises(InputError, match=message):
-        JobEngine(**fields)
-
-
-@pytest.mark.parametrize(
     ("function", "job", "message"),
     [
         (lambda job: job, {}, "function: expected a function at the top level"),
         (os.path.join, {"k": object()}, r"jobs\[0\]: expected a dict of finite"),
-        (os.path.join, {"k": math.nan}, r"jobs\[0\]: expected a dict of finite"),
         (os.path.join, 3, r"jobs\[0\]: expected a dict .*, got 3"),
     ],
 )
@@ -261,45 +220,21 @@ def test_wrong_jobs_are_refused(function, job, message):
         run_jobs(function, [job])
 
 
+def test_wrong_engines_are_refused():
+    with pytest.raises(InputError, match=r"engine: .*Did you mean 'ray'"):
+        JobEngine("rai")
+    with pytest.raises(InputError, match="it is for engine 'ray'"):
+        JobEngine(address="10.0.0.1:6379")
+
+
 @needs_ray
-@pytest.mark.parametrize("address", ["10.0.0.1", "10.0.0.1:ray"])
-def test_an_address_without_host_and_port_is_refused(address):
+@pytest.mark.parametrize("address", ["10.0.0.1", "127.0.0.1:1"])
+def test_an_address_that_does_not_answer_is_refused(address):
     with pytest.raises(EngineError, match=r"expected .* at 'HOST:PORT'"):
         run_jobs(os.path.join, [{}], JobEngine("ray", address=address))
-
-
-@needs_ray
-def test_an_address_that_does_not_answer_is_refused_and_nothing_is_left(
-    functions, tmp_path
-):
-    with socket.socket() as silent:
-        silent.bind(("127.0.0.1", 0))
-        address = f"127.0.0.1:{silent.getsockname()[1]}"
-        engine = JobEngine("ray", address=address, keep=tmp_path / "kept")
-        with pytest.raises(EngineError, match="address: expected a Ray cluster"):
-            run_jobs(functions.spectrum, [{"n": 1}], engine)
-    assert not (tmp_path / "kept").exists()
 
 
 def test_without_ray_its_engine_says_how_to_install_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(EngineError, match=r"pip install 'shipgym\[ray\]'"):
         run_jobs(os.path.join, [{}], JobEngine("ray"))
-
-
-def test_json_keeps_types_shapes_and_bits():
-    value = {
-        "integers": np.arange(6, dtype=np.int32).reshape(2, 3)[:, ::2],
-        "floats": np.array([0.1 + 0.2, -0.0, math.nan, math.inf]),
-        "texts": np.array(["a", "bc"]),
-        "list": [0.1 + 0.2, np.float32(0.1), np.True_, None],
-    }
-    back = result_from_json(result_to_json(value))
-    for name in ("integers", "floats", "texts"):
-        np.testing.assert_array_equal(back[name], value[name])
-        assert back[name].dtype == value[name].dtype
-    assert np.signbit(back["floats"][1])
-    assert back["list"] == [0.1 + 0.2, float(np.float32(0.1)), True, None]
-    for wrong in (object(), {1, 2}, np.array([None]), np.array([1j])):
-        with pytest.raises(TypeError, match="result: expected numbers"):
-            result_to_json(wrong)
