@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from papers.xu2020_tank import xu_ship
+from pynmea2 import NMEASentence
 
 import agents
 import shipgym
@@ -27,7 +28,6 @@ from agents.training.plan import TrainingRequest, make_plan
 from agents.training.run_folder import begin_folder
 from shipgym import Episode, Particulars, ShipFile, ShipModel
 from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
-from shipgym.trials.nmea import checksum
 
 CORPUS = Path(__file__).parents[2] / "tests" / "corpus"
 EXAMPLE = Path(shipgym.__file__).parent / "examples" / "mariner"
@@ -112,7 +112,7 @@ def logs(folder: Path) -> None:
         )
     ]
     texts = [f"{talker}{kind},{text}" for talker, kind, text in fields]
-    lines = [f"${text}*{checksum(text)}" for text in texts]
+    lines = [f"${text}*{NMEASentence.checksum(text):02X}" for text in texts]
     (folder / "log" / "bridge.nmea").write_text("\r\n".join(lines) + "\r\n")
 
 

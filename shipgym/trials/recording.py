@@ -27,7 +27,8 @@ from shipgym.trials.plausibility.positions import (
     find_outliers,
 )
 from shipgym.trials.plausibility.ranges import check_ranges
-from shipgym.trials.readers.log_table import LogTable, is_number
+from shipgym.trials.readers.cell_texts import is_number
+from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.resampling import (
     FEWEST_SAMPLES,
     Signal,

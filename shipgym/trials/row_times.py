@@ -9,7 +9,8 @@ from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.trials.clock_texts import DAY, read_clock, zone_seconds
 from shipgym.trials.columns import Column
-from shipgym.trials.readers.log_table import LogTable, is_number
+from shipgym.trials.readers.cell_texts import is_number
+from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.units import si_factor
 
 _WEEK = 7.0 * DAY

@@ -1,7 +1,8 @@
-"""Channels of a trial and the units in which a file may hold them."""
+"""Channels of a trial, the units in which a file may hold them, and their spellings."""
 
 import math
-from typing import Any
+from fnmatch import fnmatchcase
+from typing import Any, NamedTuple
 
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
@@ -14,6 +15,7 @@ DEGREE, KNOT = math.pi / 180.0, 1852.0 / 3600.0
 UNITS: dict[str, dict[str, float]] = shipped_toml("shipgym.trials", "units.toml")
 
 _CHANNELS = shipped_toml("shipgym.trials", "channels.toml")
+_SPELLINGS: dict[str, list[str]] = shipped_toml("shipgym.trials", "unit_names.toml")
 
 #: The quantity that each channel measures.
 QUANTITIES: dict[str, str] = {name: row["quantity"] for name, row in _CHANNELS.items()}
@@ -77,3 +79,44 @@ def check_channel(name: str, where: str, *, time: bool = True) -> str:
             f"{where}: unknown channel {name!r}.{hint} Known channels: {names}"
         )
     return name
+
+
+class NameEnd(NamedTuple):
+    """A column's name, parted from its unit."""
+
+    name: str
+    units: list[str]  # that are spelled like its end, the longest first
+
+
+def split_unit(name: str) -> NameEnd:
+    """Part a column's name from the unit with which it ends.
+
+    The name is in lower case, with blanks for underscores.
+    """
+    text = name.replace(" per ", "/")
+    text = text.rstrip("]) ")
+    bare = text
+    units: list[str] = []
+    for start, before in enumerate(f" {text[:-1]}"):
+        if before not in "[( ":
+            continue
+        spelled = spelled_units(text[start:])
+        if spelled and not units:
+            bare = text[:start]
+        units += spelled
+    return NameEnd(bare.rstrip("[( "), units)
+
+
+def spelled_units(text: str) -> list[str]:
+    """Units that may be spelled so."""
+    units = []
+    for unit, spellings in _SPELLINGS.items():
+        if any(fnmatchcase(text, spelling) for spelling in spellings):
+            units.append(unit)
+    return units
+
+
+def unit_of_channel(units: list[str], channel: str) -> str | None:
+    """The first of some units that is one of a channel; None if there is none."""
+    of_channel = UNITS[QUANTITIES[channel]]
+    return next((unit for unit in units if unit in of_channel), None)

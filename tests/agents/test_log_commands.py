@@ -95,9 +95,7 @@ def test_a_log_beside_others_that_cannot_be_read_is_told(log, monkeypatch, capsy
         monkeypatch, capsys, "new-ship", "log.csv", "lag.csv", "--length", "150"
     )
     assert code == 0
-    assert (
-        "warning: lag.csv: there is no such CSV file. Did you mean 'log.csv'?" in said
-    )
+    assert "warning: lag.csv: there is no such log. Did you mean 'log.csv'?" in said
 
 
 def test_a_log_that_does_not_tell_the_rudders_sign_leaves_it_to_the_others(

@@ -532,26 +532,6 @@ def test_what_canboat_prints_is_read(form, tmp_path):
 # --- what can only be looked at
 
 
-def test_a_gpx_track_is_named_and_can_be_looked_at(tmp_path):
-    points = [
-        f'<trkpt lat="{one.lat:.6f}" lon="{one.lon:.6f}">'
-        f"<time>{clock(one.t, '%Y-%m-%dT%H:%M:%SZ')}</time></trkpt>"
-        for one in sailed()
-    ]
-    trial = read(
-        tmp_path,
-        [
-            '<?xml version="1.0"?><gpx xmlns="http://www.topografix.com/GPX/1/1">',
-            "<trk><trkseg>",
-            *points,
-            "</trkseg></trk></gpx>",
-        ],
-        "track.gpx",
-    )
-    assert len(trial) == 240
-    said(trial, "this looks like a GPX track: it has neither rudder nor heading")
-
-
 def test_a_log_of_ais_is_named(tmp_path):
     lines = ["!AIVDM,1,1,,B,13u=gHP3CWPlvs2Q8sHW:5fD0h6a,0*1B"] * 9
     with pytest.raises(InputError, match="this looks like a log of AIS"):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from shipgym.errors import InputError
 from shipgym.trials.guesses import guess_trial
@@ -254,9 +255,9 @@ def test_a_steering_command_stands_for_the_rudder(tmp_path, names, edit):
     [
         (b"#ROSBAG V2.0\n", "a bag of ROS 1; write its topic as CSV: rostopic echo"),
         (b"\x89MCAP0\r\n", "an MCAP file"),
-        (b"\xa3\x95\x80\x80", "of ArduPilot; write its messages as CSV: mavlogdump.py"),
-        (b"ULog\x01\x12\x35", "a ULog of PX4; write its topics as CSV: ulog2csv"),
-        (b"%PDF-1.4", "a PDF; export the record"),
+        (b"\xa3\x95\x80\x80", "of ArduPilot or PX4; write its messages as CSV"),
+        (b"\x93NUMPY", "a numpy file; write it as CSV"),
+        (b"<?xml version='1.0'?><gpx>", "a track (GPX or KML) without rudder"),
         (b"<!DOCTYPE html>", "a web page; download the file itself"),
         (b'{"a": [1]}', "a JSON file"),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "(.xls); save it as .xlsx"),
@@ -269,18 +270,12 @@ def test_a_foreign_file_is_named_with_what_reads_it(tmp_path, content, words):
     assert words in str(refused.value)
 
 
-def test_arrays_of_numpy_and_matlab_are_columns_or_ask_for_names(tmp_path):
-    io = pytest.importorskip("scipy.io")
+def test_a_matrix_of_matlab_asks_for_the_names_of_its_columns(tmp_path):
     matrix = np.column_stack([np.arange(float(N)), SAILED[:, 4:]])
-    names = [(name, float) for name in ("t", "psi", "delta")]
-    np.save(tmp_path / "log.npy", np.array([tuple(row) for row in matrix], names))
-    check(guess_trial(tmp_path / "log.npy"), speeds=False)
-    np.save(tmp_path / "plain.npy", matrix)
-    io.savemat(tmp_path / "simdata.mat", {"simdata": matrix})
-    for file, column in {"plain.npy": "array", "simdata.mat": "simdata"}.items():
-        heading, rudder = guess_trial(tmp_path / file).decisions
-        assert (heading.key, rudder.key) == ("psi", "delta")
-        assert f"the column of the heading, one of '{column}(:,2)'" in heading.choices
+    savemat(tmp_path / "simdata.mat", {"simdata": matrix})
+    heading, rudder = guess_trial(tmp_path / "simdata.mat").decisions
+    assert (heading.key, rudder.key) == ("psi", "delta")
+    assert "the column of the heading, one of 'simdata(:,2)'" in heading.choices
     columns = {"t": "simdata(:,1)"}
     for number, channel in enumerate(("psi", "delta"), start=2):
         columns[channel] = {"column": f"simdata(:,{number})", "unit": "deg"}

@@ -23,8 +23,7 @@ from shipgym.trials.guesses.units import (
 )
 from shipgym.trials.readers.cell_texts import number_with_unit
 from shipgym.trials.readers.log_table import LogTable
-from shipgym.trials.unit_spellings import spelled_units, split_unit
-from shipgym.trials.units import QUANTITIES
+from shipgym.trials.units import QUANTITIES, spelled_units, split_unit
 
 _WITH_UNIT = "with_unit"  # not a language
 _SIGNAL_K = re.compile(r"(navigation|steering|propulsion|environment)\.", re.IGNORECASE)

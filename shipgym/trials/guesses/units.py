@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.trials.unit_spellings import unit_of_channel
-from shipgym.trials.units import QUANTITIES, UNITS, si_unit
+from shipgym.trials.units import QUANTITIES, UNITS, si_unit, unit_of_channel
 
 #: Size from which on a channel or quantity is not in SI units, and the unit that it has
 #: then.

@@ -3,7 +3,7 @@
 import re
 from typing import NamedTuple
 
-from shipgym.trials.unit_spellings import spelled_units
+from shipgym.trials.units import spelled_units
 
 #: Words that stand for "no value"; so does a text of dashes or other signs alone.
 _MISSING_WORDS = re.compile(
@@ -12,25 +12,15 @@ _MISSING_WORDS = re.compile(
     r"|#(value|num)!|#div/0!|#ref!|#name\?|-?1\.#(qnan|ind)",
     re.IGNORECASE,
 )
-_SIDES = {
-    1.0: "s|r|stbd|stb|sb|starboard|right|steuerbord|td|tribord|estribor|右",
-    -1.0: "p|l|port|bb|backbord|babord|bâbord|bd|babor|left|左",
-}
-_NUMBER = r"\d+(?:\.\d*)?|\.\d+"
-_UNIT_AFTER = re.compile(
-    rf"(?P<number>[-+]?(?:{_NUMBER})(?:e[-+]?\d+)?)\s*(?P<unit>[^\W\d_][\w/.]*|°\w?|%)",
-    re.IGNORECASE,
+_STARBOARD = "s|r|stbd|stb|sb|starboard|right|steuerbord|td|tribord|estribor|右"
+_PORT = "p|l|port|bb|backbord|babord|bâbord|bd|babor|left|左"
+_NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)"
+_WITH_UNIT = re.compile(
+    rf"([-+]?{_NUMBER}(?:e[-+]?\d+)?)\s*([^\W\d_][\w/.]*|°\w?|%)", re.IGNORECASE
 )
-_SIDED = [
-    (
-        sign,
-        re.compile(
-            rf"(?:(?:{words})\.?\s*(?P<a>{_NUMBER})\s*°?"
-            rf"|(?P<b>{_NUMBER})\s*°?\s*(?:{words})\.?)",
-            re.IGNORECASE,
-        ),
-    )
-    for sign, words in _SIDES.items()
+_WITH_SIDE = [
+    (sign, re.compile(rf"(?:(?:{words})\.?\s*)?({_NUMBER})\s*°?(?:\s*(?:{words})\.?)?"))
+    for sign, words in ((1.0, _STARBOARD), (-1.0, _PORT))
 ]
 
 
@@ -38,10 +28,16 @@ def is_missing(text: str) -> bool:
     """Return whether a cell stands for "no value": blank, signs alone, or a word."""
     bare = text.strip()
     has_letters = any(letter.isalnum() for letter in bare)
-    if not has_letters:
-        return True
-    match = _MISSING_WORDS.fullmatch(bare)
-    return match is not None
+    return not has_letters or _MISSING_WORDS.fullmatch(bare) is not None
+
+
+def is_number(text: str) -> bool:
+    """Return whether a text is a number as Python reads it, without underscores."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return "_" not in text
 
 
 def number_with_side(text: str) -> float | None:
@@ -49,11 +45,13 @@ def number_with_side(text: str) -> float | None:
 
     To starboard positive.
     """
-    for sign, pattern in _SIDED:
-        match = pattern.fullmatch(text)
+    bare = text.lower()
+    if not any(letter.isalpha() for letter in bare):
+        return None
+    for sign, pattern in _WITH_SIDE:
+        match = pattern.fullmatch(bare)
         if match:
-            number = match["a"] or match["b"]
-            return sign * float(number)
+            return sign * float(match[1])
     return None
 
 
@@ -66,12 +64,7 @@ class Measured(NamedTuple):
 
 def number_with_unit(text: str) -> Measured | None:
     """Number and unit of a text such as "13.6 kn"; None for others."""
-    match = _UNIT_AFTER.fullmatch(text)
-    if match is None:
+    match = _WITH_UNIT.fullmatch(text)
+    if match is None or not spelled_units(match[2].lower()):
         return None
-    unit = match["unit"]
-    known = spelled_units(unit.lower())
-    if not known:
-        return None
-    number = float(match["number"])
-    return Measured(number, unit)
+    return Measured(float(match[1]), match[2])

@@ -1,13 +1,16 @@
 """Tables in CSV files, with the exact place of errors."""
 
+import io
 import re
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from shipgym.errors import InputError
+from shipgym.trials.readers.cell_texts import is_number
 from shipgym.trials.readers.layout import (
+    BLANKS,
     Layout,
     find_layout,
     is_data,
@@ -16,8 +19,8 @@ from shipgym.trials.readers.layout import (
     unit_texts,
     without_spare,
 )
-from shipgym.trials.readers.log_table import LogTable, is_number
-from shipgym.trials.readers.text_files import LogText, decode, read_log_bytes
+from shipgym.trials.readers.log_table import LogTable
+from shipgym.trials.readers.text_files import text_lines
 
 _LONGEST_LINE = 100_000  # characters
 
@@ -25,47 +28,41 @@ _LONGEST_LINE = 100_000  # characters
 class _Body(NamedTuple):
     """Rows of a table below its names."""
 
-    rows: dict[int, list[str]]  # by the number of their line
+    lines: dict[int, str]  # by their number
     notes: list[str]  # on lines that were left out
 
 
-def read_csv(path: str | Path) -> LogTable:
+def read_csv(path: Path, content: bytes) -> LogTable:
     """Read a CSV file, its delimiter comma, semicolon, tab, bar or blanks.
 
     Lines of title above the line with the names are left out, lines below it with units
-    are read as such. The encoding is UTF-8, UTF-16, Latin-1 or one of East Asia, and
-    the file may be packed by gzip. Raises InputError for a missing file, a folder, an
-    empty or binary file, repeated or no names in the header, and a row with more or
-    fewer cells than the header.
+    are read as such. The encoding is UTF-8, UTF-16, Latin-1 or one of East Asia. Raises
+    InputError for an empty or binary file, repeated or no names in the header, and a
+    row with more or fewer cells than the header.
     """
-    path = Path(path)
-    text = _read(path, "CSV file")
-    lines = _lines(path, text.text)
-    for number, line in enumerate(lines, start=1):
-        if "\0" in line or len(line) > _LONGEST_LINE:
-            raise _no_text(path, number, line)
+    lines, encoding = text_lines(path, content)
+    _check_text(path, lines)
     layout = find_layout(lines) or _first_line(path, lines)
     delimiter = layout.delimiter
-
-    header_at = layout.header + 1
     names = split(lines[layout.header], delimiter)
     header = [name.strip() for name in names]
     while len(header) > 2 and not header[-1]:
         header.pop()
+    header_at = layout.header + 1
     _check_header(path, header, header_at)
 
     notes = []
-    if text.encoding:
-        notes.append(f"the text is in {text.encoding}, by the names of its columns")
+    if encoding:
+        notes.append(f"the text is in {encoding}, by the names of its columns")
     titles = [line for line in lines[: layout.header] if line.strip()]
     notes += title_note(header_at, len(titles))
     unit_rows = [split(lines[number], delimiter) for number in layout.units]
-    body = _read_body(path, lines, layout, header)
-    columns = zip(*body.rows.values(), strict=True) if body.rows else [()] * len(header)
+    body = _find_rows(path, lines, layout, len(header))
+    columns = _columns(list(body.lines.values()), delimiter, len(header))
     return LogTable(
         path=path,
         cells=dict(zip(header, columns, strict=True)),
-        rows=list(body.rows),
+        rows=list(body.lines),
         place_words="line {line} (data row {row})",
         decimal_comma=delimiter != ",",
         unit_row=unit_texts(header, unit_rows),
@@ -73,86 +70,89 @@ def read_csv(path: str | Path) -> LogTable:
     )
 
 
-def _read_body(
-    path: Path, lines: Sequence[str], layout: Layout, header: list[str]
-) -> _Body:
+def _find_rows(path: Path, lines: Sequence[str], layout: Layout, n_cells: int) -> _Body:
     """Rows below the names, without blank lines, names again and units."""
     delimiter = layout.delimiter
     names = lines[layout.header].strip()
-    n_cells = len(header)
     blank = delimiter + " \t"
-    last = max(number for number, line in enumerate(lines) if line.strip())
-    rows: dict[int, list[str]] = {}
+    rows: dict[int, str] = {}
     notes = []
-    for number in range(layout.header + 1, len(lines)):
-        line = lines[number]
+    for number, line in enumerate(lines[layout.header + 1 :], start=layout.header + 1):
         is_names = line.strip() == names
         if number in layout.units or is_names or not line.strip(blank):
             continue
-        cells = without_spare(split(line, delimiter), n_cells)
-        if len(cells) < n_cells and rows:
-            is_footer = not is_data(cells)
-            is_cut = number == last and last == len(lines) - 1
-            if is_footer or is_cut:
+        found = len(without_spare(split(line, delimiter), n_cells))
+        if found < n_cells and rows:
+            is_cut = number == len(lines) - 1
+            if is_cut or not is_data(split(line, delimiter)):
                 left_out = "is cut short" if is_cut else "is no row of the table"
                 notes.append(f"line {number + 1} {left_out} and is left out")
                 continue
-        rows[number + 1] = cells
-        if len(cells) != n_cells:
+        rows[number + 1] = line
+        if found != n_cells:
             raise InputError(
                 f"{path}: line {number + 1} (data row {len(rows)}): expected"
-                f" {n_cells} cells as in the header, got {len(cells)}; complete or"
+                f" {n_cells} cells as in the header, got {found}; complete or"
                 " remove the row"
             )
     return _Body(rows, notes)
 
 
-def read_lines(path: Path, what: str) -> list[str]:
-    """Lines of a text file, at most a million; `what` names the file's kind."""
-    text = _read(path, what)
-    return _lines(path, text.text)
+def _columns(rows: list[str], delimiter: str, n_cells: int) -> list[Any]:
+    """Columns of rows: numbers where all cells are plain ones, else texts."""
+    import pandas as pd
+
+    if not rows:
+        return [()] * n_cells
+    text = "\n".join(rows)
+    sign = r"\s" if delimiter == BLANKS else re.escape(delimiter)
+    # digits that are more than a number, such as the clock 095950
+    is_of_digits = re.search(rf"(?m)(^|{sign}) *0\d[\d.]* *($|{sign})", text)
+    if is_of_digits or '"' in text:
+        cells = [split(row, delimiter)[:n_cells] for row in rows]
+        return list(zip(*cells, strict=True))
+    frame = pd.read_csv(
+        io.StringIO(text),
+        sep=r"\s+" if delimiter == BLANKS else delimiter,
+        header=None,
+        usecols=range(n_cells),
+        keep_default_na=False,
+        na_values=[""],
+        low_memory=False,
+    )
+    columns: list[Any] = []
+    for _, column in frame.items():
+        if column.dtype.kind in "iuf":
+            columns.append(column.to_numpy())
+        else:
+            texts = column.astype(object).where(column.notna(), "")
+            columns.append([str(cell) for cell in texts])
+    return columns
 
 
-def _read(path: Path, what: str) -> LogText:
-    content = read_log_bytes(path, what)
-    return decode(path, what, content)
-
-
-def _lines(path: Path, text: str) -> list[str]:
-    text = text.replace("\r\n", "\n")
-    text = text.replace("\r", "\n")
-    lines = text.split("\n")
-    count = len(lines)
-    most = 1_000_000
-    if count > most:
-        raise InputError(
-            f"{path}: expected at most {most} lines, got {count}; split the file"
-        )
-    return lines
+def _check_text(path: Path, lines: Sequence[str]) -> None:
+    """Refuse zero bytes, and lines too long for a table."""
+    for number, line in enumerate(lines, start=1):
+        if "\0" in line or len(line) > _LONGEST_LINE:
+            fault = f"{len(line)} characters"
+            if "\0" in line:
+                fault = "binary content (a zero byte)"
+            raise InputError(
+                f"{path}: line {number}: expected text of at most {_LONGEST_LINE}"
+                f" characters, got {fault}; save the table as comma-separated text in"
+                " UTF-8"
+            )
 
 
 def _first_line(path: Path, lines: Sequence[str]) -> Layout:
     """Layout of a table whose names are in the first line, whatever follows."""
     for number, line in enumerate(lines):
-        if not line.strip():
-            continue
-        unquoted = re.sub('"[^"]*"', "", line)
-        delimiter = max(",;\t", key=unquoted.count)
-        return Layout(delimiter, header=number, units=())
+        if line.strip():
+            unquoted = re.sub('"[^"]*"', "", line)
+            return Layout(max(",;\t", key=unquoted.count), header=number)
     raise InputError(
         f"{path}: expected a header line with column names and rows below, got an"
         " empty file"
-    )
-
-
-def _no_text(path: Path, number: int, line: str) -> InputError:
-    """Error of a line with zero bytes, or too long for a table."""
-    fault = f"{len(line)} characters"
-    if "\0" in line:
-        fault = "binary content (a zero byte)"
-    return InputError(
-        f"{path}: line {number}: expected text of at most {_LONGEST_LINE}"
-        f" characters, got {fault}; save the table as comma-separated text in UTF-8"
     )
 
 

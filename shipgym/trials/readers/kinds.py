@@ -1,37 +1,29 @@
 """Kinds of logs, recognised by name and beginning of a file, and their readers."""
 
+import io
 import re
+import zipfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
+from shipgym.errors import InputError
+from shipgym.files import shipped_toml
 from shipgym.trials.readers.calendar_columns import with_one_time
 from shipgym.trials.readers.csv_file import read_csv
-from shipgym.trials.readers.excel import read_excel
-from shipgym.trials.readers.foreign import kind_by_content, refuse_foreign
-from shipgym.trials.readers.gpx import read_gpx
+from shipgym.trials.readers.frames import read_excel, read_parquet
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.readers.matlab import read_matlab
-from shipgym.trials.readers.numpy_file import read_numpy
-from shipgym.trials.readers.parquet import read_parquet
 from shipgym.trials.readers.text_files import read_log_bytes
 
-
-def _read_messages(path: Path, checksums: str = "optional") -> LogTable:
-    from shipgym.trials.readers.message_log import read_messages  # with its tables
-
-    return read_messages(path, strict=checksums == "required")
-
-
-READERS: dict[str, Callable[[Path], LogTable]] = {
+_READERS: dict[str, Callable[[Path, bytes], LogTable]] = {
     "csv": read_csv,
     "excel": read_excel,
-    "gpx": read_gpx,
     "matlab": read_matlab,
-    "messages": _read_messages,
-    "numpy": read_numpy,
     "parquet": read_parquet,
 }
 _ENDINGS = {".xlsx": "excel", ".mat": "matlab", ".parquet": "parquet"}
+_MAGIC = {b"PAR1": "parquet", b"MATLAB 5.0": "matlab", b"MATLAB 7.3": "matlab"}
 #: Sentences of NMEA 0183, deltas of Signal K and messages of NMEA 2000 at the beginning
 #: of a file.
 _MESSAGES = re.compile(
@@ -46,26 +38,40 @@ _MESSAGES = re.compile(
 )
 
 
-def recognise_kind(path: Path) -> str:
-    """Kind of a log, a key of `READERS`; a text is CSV unless it begins otherwise.
+def recognise_kind(path: Path, content: bytes) -> str:
+    """Kind of a log; a text is "csv" unless it begins as "messages" or otherwise.
 
-    Raises InputError for a text file that is missing or too large.
+    Raises InputError for a known kind of file that is no log.
     """
     ending = path.suffix.lower()
     if ending in _ENDINGS:
         return _ENDINGS[ending]
-    content = read_log_bytes(path, "CSV file")
-    binary = kind_by_content(content)
-    if binary is not None:
-        return binary
-    beginning = content[:4096].decode("latin-1")
-    beginning = beginning.replace("\r", "\n")
+    for magic, kind in _MAGIC.items():
+        if content.startswith(magic):
+            return kind
+    if content.startswith(b"PK\x03\x04"):
+        with suppress(zipfile.BadZipFile, ValueError, OSError, NotImplementedError):
+            if "xl/workbook.xml" in zipfile.ZipFile(io.BytesIO(content)).namelist():
+                return "excel"
+    beginning = content[:4096].decode("latin-1").replace("\r", "\n")
     if len(_MESSAGES.findall(beginning)) >= 2:
         return "messages"
-    if "<gpx" in beginning:
-        return "gpx"
-    refuse_foreign(path, content)
+    _refuse_foreign(path, content)
     return "csv"
+
+
+def _refuse_foreign(path: Path, content: bytes) -> None:
+    """Refuse a file that is no log; name its kind, and the smallest step to a log."""
+    beginning = content[:4096].decode("latin-1").lower()
+    for kind in shipped_toml("shipgym.trials.readers", "foreign.toml")["kind"]:
+        magics = tuple(bytes.fromhex(magic) for magic in kind.get("magic", [""]))
+        if (
+            content.startswith(magics)
+            and re.match(kind.get("text", ""), beginning, re.DOTALL)
+            and path.name.lower().endswith(kind.get("ending", ""))
+        ):
+            step = kind["step"].replace("FILE", path.name)
+            raise InputError(f"{path}: expected a log, got {kind['what']}; {step}")
 
 
 def read_log(path: str | Path | LogTable, *, checksums: str = "optional") -> LogTable:
@@ -78,9 +84,10 @@ def read_log(path: str | Path | LogTable, *, checksums: str = "optional") -> Log
     if isinstance(path, LogTable):
         return path
     path = Path(path)
-    kind = recognise_kind(path)
+    content = read_log_bytes(path, "log")
+    kind = recognise_kind(path, content)
     if kind == "messages":
-        return _read_messages(path, checksums)
-    read = READERS[kind]
-    table = read(path)
-    return with_one_time(table)
+        from shipgym.trials.readers.message_log import read_messages  # with its tables
+
+        return read_messages(path, content, strict=checksums == "required")
+    return with_one_time(_READERS[kind](path, content))

@@ -4,12 +4,13 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import islice
 from typing import NamedTuple
 
 from shipgym.trials.readers.cell_texts import is_missing
-from shipgym.trials.unit_spellings import split_unit
+from shipgym.trials.units import split_unit
 
-_BLANKS = " "  # for a delimiter: any number of them
+BLANKS = " "  # for a delimiter: any number of them
 
 _VALUE = re.compile(
     r"\W*(?:[NSEWPR]|STBD|STB|BB|PORT|STARBOARD)?\W*\d.*", re.IGNORECASE
@@ -26,38 +27,37 @@ class Layout(NamedTuple):
 
     delimiter: str
     header: int  # the line with the names
-    units: tuple[int, ...]  # lines of units below it
+    units: tuple[int, ...] = ()  # lines of units below it
 
 
 def split(line: str, delimiter: str) -> list[str]:
     """Cells of a line."""
-    if delimiter == _BLANKS:
+    if delimiter == BLANKS:
         return line.split()
     if '"' in line:
         return next(csv.reader([line], delimiter=delimiter))
     return line.split(delimiter)
 
 
-def without_spare(cells: Sequence[str], n_cells: int) -> list[str]:
+def without_spare(cells: list[str], n_cells: int) -> list[str]:
     """Cells of a line that ends with delimiters too many, without those."""
-    spare = cells[n_cells:]
-    is_spare = not any(cell.strip() for cell in spare)
-    return list(cells[:n_cells] if is_spare else cells)
+    is_spare = len(cells) > n_cells and not any(map(str.strip, cells[n_cells:]))
+    return cells[:n_cells] if is_spare else cells
 
 
 def find_layout(lines: Sequence[str]) -> Layout | None:
     """Layout of the table in a text; None where no line of names fits the rows."""
     most_lines = 200  # that are looked at
-    numbered = {}
-    for number, line in enumerate(lines):
-        if line.strip():
-            numbered[number] = line
-        if len(numbered) == most_lines:
-            break
+    filled = ((number, line) for number, line in enumerate(lines) if line.strip())
+    numbered = dict(islice(filled, most_lines))
     for delimiter in _likely_delimiters(numbered.values()):
-        layout = _with_delimiter(numbered, delimiter)
-        if layout is not None:
-            return layout
+        rows = {number: split(line, delimiter) for number, line in numbered.items()}
+        layout = layout_of_rows(rows)
+        if layout is None:
+            continue
+        names = rows[layout.header]
+        if delimiter != BLANKS or _distinct(names) == len(names):
+            return layout._replace(delimiter=delimiter)
     return None
 
 
@@ -67,29 +67,15 @@ def _likely_delimiters(lines: Iterable[str]) -> list[str]:
     counts = Counter[str]()
     for line in lines:
         unquoted = re.sub('"[^"]*"', "", line)
-        characters = set(unquoted)
-        present = characters.intersection(delimiters)
-        counts.update(present)
+        counts.update(set(unquoted).intersection(delimiters))
     likely = [one for one in delimiters if counts[one]]
     likely.sort(key=counts.__getitem__, reverse=True)
     if "\t" not in likely:
-        likely.append(_BLANKS)
+        likely.append(BLANKS)
     return likely
 
 
-def _with_delimiter(numbered: dict[int, str], delimiter: str) -> Layout | None:
-    """Layout with a delimiter; None where names and rows are not parted by it."""
-    rows = {number: split(line, delimiter) for number, line in numbered.items()}
-    layout = layout_of_rows(rows)
-    if layout is None:
-        return None
-    names = rows[layout.header]
-    if delimiter == _BLANKS and _distinct(names) < len(names):
-        return None
-    return layout._replace(delimiter=delimiter)
-
-
-def layout_of_rows(rows: Mapping[int, Sequence[str]]) -> Layout | None:
+def layout_of_rows(rows: Mapping[int, list[str]]) -> Layout | None:
     """Layout of rows of cells by their numbers; None where no names fit the values."""
     data = [number for number, cells in rows.items() if is_data(cells)]
     widths = Counter(len(rows[number]) for number in data)
@@ -107,25 +93,18 @@ def layout_of_rows(rows: Mapping[int, Sequence[str]]) -> Layout | None:
     for number, cells in rows.items():
         n_named = len(without_spare(cells, n_cells))
         fits = n_named == n_cells or (ends_blank and n_named == n_cells - 1)
-        if number >= first or not fits:
-            continue
-        if is_unit_row(cells, is_below=bool(names)):
-            units.append(number)
-        else:
-            names.append(number)
+        if number < first and fits:
+            is_units = is_unit_row(cells, is_below=bool(names))
+            (units if is_units else names).append(number)
     if not names:
         return None
-
-    most = max(_distinct(rows[number]) for number in names)
-    header = max(number for number in names if _distinct(rows[number]) == most)
-    below = tuple(number for number in units if number > header)
-    return Layout("", header, below)
+    header = max(names, key=lambda number: (_distinct(rows[number]), number))
+    return Layout("", header, tuple(number for number in units if number > header))
 
 
 def _distinct(cells: Sequence[str]) -> int:
     """Number of different names."""
-    named = {cell.strip() for cell in cells} - {""}
-    return len(named)
+    return len({cell.strip() for cell in cells} - {""})
 
 
 def unit_texts(
@@ -136,10 +115,8 @@ def unit_texts(
     for cells in unit_rows:
         for name, cell in zip(header, cells, strict=False):
             bare = cell.strip("[]() \t")
-            is_first = name not in units
-            is_known = not is_missing(bare)
-            if is_first and is_known:
-                units[name] = bare
+            if not is_missing(bare):
+                units.setdefault(name, bare)
     return units
 
 
@@ -171,9 +148,7 @@ def is_unit_row(cells: Sequence[str], *, is_below: bool) -> bool:
 
 
 def _is_unit(cell: str, *, is_below: bool) -> bool:
-    if _UNIT_WORDS.fullmatch(cell):
-        return True
-    if is_below and len(cell) == 1:
+    if _UNIT_WORDS.fullmatch(cell) or (is_below and len(cell) == 1):
         return True
     name, units = split_unit(cell.lower())
     return bool(units) and not name

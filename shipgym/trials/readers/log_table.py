@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
 from shipgym.trials.readers.cell_texts import (
     is_missing,
+    is_number,
     number_with_side,
     number_with_unit,
 )
@@ -62,13 +64,13 @@ class LogTable:
         """Names of the columns, without blanks around them."""
         return tuple(self.cells)
 
-    def place(self, row: int) -> str:
-        """Place of a row, counted from 0, for a message: ``line 12 (data row 11)``."""
-        return self.place_words.format(line=self.rows[row], row=row + 1)
-
     def cell(self, row: int, column: str) -> str:
-        """Place of a cell: ``run.csv: line 12 (data row 11), column 'yaw'``."""
-        return f"{self.path}: {self.place(row)}, column '{column}'"
+        """Place of a cell: ``run.csv: line 12 (data row 11), column 'yaw'``.
+
+        Rows count from 0.
+        """
+        place = self.place_words.format(line=self.rows[row], row=row + 1)
+        return f"{self.path}: {place}, column '{column}'"
 
     def column(self, name: str) -> Any:
         """Cells of a column; InputError if there is none of this name."""
@@ -83,13 +85,8 @@ class LogTable:
 
     def texts(self, name: str) -> list[str]:
         """Cells of a column as stripped texts, empty where there is no value."""
-        texts = []
-        for cell in self.column(name):
-            text = str(cell).strip()
-            if is_missing(text):
-                text = ""
-            texts.append(text)
-        return texts
+        texts = [str(cell).strip() for cell in self.column(name)]
+        return ["" if is_missing(text) else text for text in texts]
 
     def numbers(self, name: str, *, sided: bool = False) -> Floats:
         """A column as numbers, nan where there is no value.
@@ -98,22 +95,12 @@ class LogTable:
         to port. Raises InputError for other text.
         """
         cells = self.column(name)
-        kind = cells.dtype.kind if isinstance(cells, np.ndarray) else None
-        if kind in ("f", "i", "u", "b"):
+        if isinstance(cells, np.ndarray) and cells.dtype.kind in "fiub":
             return np.asarray(cells, dtype=np.float64)
-        try:
-            return plain_numbers(cells)
-        except (ValueError, TypeError, OverflowError):  # integers of any size in Excel
-            return self._numbers_of_texts(name, sided=sided)
-
-    def _numbers_of_texts(self, name: str, *, sided: bool) -> Floats:
-        """Numbers of texts with decimal commas and words for "no value".
-
-        Raises InputError for the first other text.
-        """
-        texts = self.texts(name)
-        numbers = np.full(len(texts), np.nan)
-        for row, text in enumerate(texts):
+        with suppress(ValueError, TypeError, OverflowError):
+            return np.array([_plain_number(cell) for cell in cells])
+        numbers = np.full(len(cells), np.nan)
+        for row, text in enumerate(self.texts(name)):
             if text:
                 number = self._number(text, sided=sided)
                 if number is None:
@@ -143,21 +130,8 @@ class LogTable:
         )
 
 
-def plain_numbers(cells: Sequence[Any]) -> Floats:
-    """Numbers of cells that are plainly written or empty; ValueError for others."""
-    numbers = []
-    for cell in cells:
-        if "_" in str(cell):
-            raise ValueError("an underscore, which Python reads in a number")
-        number = math.nan if cell == "" else float(cell)
-        numbers.append(number)
-    return np.array(numbers)
-
-
-def is_number(text: str) -> bool:
-    """Return whether a text is a number as Python reads it, without underscores."""
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return "_" not in text
+def _plain_number(cell: Any) -> float:
+    """Number of a cell that is plainly written or empty; ValueError for others."""
+    if "_" in str(cell):
+        raise ValueError("an underscore, which Python reads in a number")
+    return math.nan if cell == "" else float(cell)

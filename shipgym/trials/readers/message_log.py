@@ -11,7 +11,6 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import placed
 from shipgym.errors import InputError
-from shipgym.trials.readers.csv_file import read_lines
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.readers.message_clock import log_clock
 from shipgym.trials.readers.message_tracks import Track, choose_tracks
@@ -19,16 +18,17 @@ from shipgym.trials.readers.messages import Heard, is_wind
 from shipgym.trials.readers.nmea0183 import hear_sentences
 from shipgym.trials.readers.nmea2000 import hear_pgns
 from shipgym.trials.readers.signalk import hear_deltas
+from shipgym.trials.readers.text_files import text_lines
 
 
-def read_messages(path: Path, *, strict: bool = False) -> LogTable:
+def read_messages(path: Path, content: bytes, *, strict: bool = False) -> LogTable:
     """Read a log's channels: SI units, positions in degrees, nan where absent.
 
     Of several sources of a channel the best is taken, and a note names the others.
     `strict` refuses sentences without a checksum. Raises InputError for a damaged log
     and one without time or channels.
     """
-    lines = read_lines(path, "log of messages")
+    lines, _ = text_lines(path, content)
     heard = Heard()
     hear_sentences(lines, heard, strict=strict)
     with placed(str(path)):

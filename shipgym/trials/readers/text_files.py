@@ -6,29 +6,29 @@ from pathlib import Path
 from typing import NamedTuple
 
 from shipgym.errors import InputError
-from shipgym.files import LARGEST_CSV, read_bytes, shipped_toml
-from shipgym.trials.readers.damage import LARGEST_UNPACKED, check_unpacked
+from shipgym.files import LARGEST_CSV, MIB, read_bytes, shipped_toml
 
+#: Most bytes that any file is unpacked to.
+LARGEST_UNPACKED = 256 * MIB
 #: Encodings of several bytes a character, and Cyrillic: none is refused by its bytes
 #: alone, so that the words decide.
 _FOREIGN = ("cp932", "gb18030", "euc_jp", "big5", "euc_kr", "cp1251")
 
 
 class LogText(NamedTuple):
-    """A text, and its encoding where it is not UTF-8."""
+    """Lines of a text, and its encoding where it is not UTF-8."""
 
-    text: str
+    lines: list[str]
     encoding: str
 
 
-def read_log_bytes(path: Path, what: str, largest: int = LARGEST_CSV) -> bytes:
+def read_log_bytes(path: Path, what: str) -> bytes:
     """Content of a file as `read_bytes` gives it, unpacked where it is gzip.
 
     Raises InputError for a damaged or too large one.
     """
-    content = read_bytes(path, what, largest)
-    magic = b"\x1f\x8b"
-    if not content.startswith(magic):
+    content = read_bytes(path, what, LARGEST_CSV)
+    if not content.startswith(b"\x1f\x8b"):
         return content
     unpacker = zlib.decompressobj(wbits=31)
     try:
@@ -47,45 +47,68 @@ def read_log_bytes(path: Path, what: str, largest: int = LARGEST_CSV) -> bytes:
     return unpacked
 
 
-def decode(path: Path, what: str, content: bytes) -> LogText:
-    """Decode the text of a log: UTF-8, UTF-16, Latin-1 or, by its words, another.
+def check_unpacked(path: Path, size: int) -> None:
+    """Refuse a file that unpacks to more than `LARGEST_UNPACKED` bytes."""
+    if size > LARGEST_UNPACKED:
+        raise InputError(
+            f"{path}: expected at most {LARGEST_UNPACKED} bytes unpacked, got more;"
+            " split the file"
+        )
 
-    Raises InputError with the line for bytes that are no text.
+
+def text_lines(path: Path, content: bytes) -> LogText:
+    """Lines of a text in UTF-8, UTF-16, Latin-1 or, by its words, another encoding.
+
+    Raises InputError for more than a million, and with the line for bytes that are no
+    text.
     """
+    text, encoding = _decode(path, content)
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    most = 1_000_000
+    if len(lines) > most:
+        raise InputError(
+            f"{path}: expected at most {most} lines, got {len(lines)}; split the file"
+        )
+    return LogText(lines, encoding)
+
+
+def _decode(path: Path, content: bytes) -> tuple[str, str]:
+    """A text and its encoding, empty for UTF-8 and Latin-1."""
     wide = _utf_16(content)
-    if wide:
-        try:
-            text = content.decode(wide)
-        except UnicodeDecodeError as error:
-            raise _no_text(path, what, content, error.start) from None
-        return LogText(text.removeprefix("\ufeff"), "UTF-16")
     try:
-        return LogText(content.decode("utf-8-sig"), "")
+        if wide:
+            return content.decode(wide).removeprefix("\ufeff"), "UTF-16"
+        return content.decode("utf-8-sig"), ""
     except UnicodeDecodeError as error:
-        foreign = _by_words(content)
-        if foreign is not None:
-            return foreign
-        # as instruments write the sign of degrees; no control characters
-        if not re.search(rb"[\x80-\x9f\xfe\xff\0]", content):
-            return LogText(content.decode("latin-1"), "")
-        raise _no_text(path, what, content, error.start) from None
+        start = error.start
+    foreign = None if wide else _by_words(content)
+    if foreign is not None:
+        return foreign
+    # as instruments write the sign of degrees; no control characters
+    if not wide and not re.search(rb"[\x80-\x9f\xfe\xff\0]", content):
+        return content.decode("latin-1"), ""
+    line = content[:start].count(b"\n") + 1
+    raise InputError(
+        f"{path}: line {line}: expected a text in UTF-8, got byte"
+        f" 0x{content[start]:02x} (binary content); save it as text in UTF-8"
+    )
 
 
 def _utf_16(content: bytes) -> str:
     """Encoding of a text in UTF-16, with or without its mark; empty for others."""
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
-    beginning = content[:400]
-    pairs = len(beginning) // 2
-    if pairs >= 4:
-        if beginning[1::2].count(0) == pairs:
-            return "utf-16-le"
-        if beginning[::2][:pairs].count(0) == pairs:
-            return "utf-16-be"
+    pairs = len(content[:400]) // 2
+    for encoding, zeros in (
+        ("utf-16-le", content[1:400:2]),
+        ("utf-16-be", content[:400:2][:pairs]),
+    ):
+        if pairs >= 4 and zeros.count(0) == pairs:
+            return encoding
     return ""
 
 
-def _by_words(content: bytes) -> LogText | None:
+def _by_words(content: bytes) -> tuple[str, str] | None:
     """Text in that encoding in which most names of channels stand; None without."""
     best = None
     most = 0
@@ -99,7 +122,7 @@ def _by_words(content: bytes) -> LogText | None:
         known = sum(len(word) for word in words if word in beginning)
         if known > most:
             most = known
-            best = LogText(text, encoding)
+            best = text, encoding
     return best
 
 
@@ -109,20 +132,5 @@ def _foreign_words() -> set[str]:
     words = set()
     for names in languages.values():
         for patterns in names.values():
-            for pattern in patterns:
-                word = pattern.strip("*")
-                has_latin = re.search("[a-z\xc0-\u024f]", word)
-                if not has_latin:
-                    words.add(word)
-    return words
-
-
-def _no_text(path: Path, what: str, content: bytes, start: int) -> InputError:
-    before = content[:start]
-    line = before.count(b"\n") + 1
-    byte = content[start]
-    expected = f"expected a {what} in UTF-8"
-    found = f"byte 0x{byte:02x} (binary content)"
-    return InputError(
-        f"{path}: line {line}: {expected}, got {found}; save it as text in UTF-8"
-    )
+            words.update(pattern.strip("*") for pattern in patterns)
+    return {word for word in words if not re.search("[a-z\xc0-\u024f]", word)}
