@@ -13,13 +13,11 @@ import pytest
 import shipgym
 from shipgym import ShipModel
 from shipgym.errors import InputError
-from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
+from shipgym.manoeuvres import zigzag
 from shipgym.models import converted_model, grey_box
 from shipgym.models.checker import check_ship_model
-from shipgym.models.linear import nomoto
 from shipgym.models.scaling import scale_model
 from shipgym.ships.structures import get_structure, register_structure
-from tests.ships.nomoto import nomoto2_ship
 
 pytestmark = pytest.mark.interpreted
 
@@ -65,46 +63,6 @@ def test_a_bare_table_of_terms_at_another_scale_is_the_scaled_model() -> None:
     np.testing.assert_allclose(ours["psi"], theirs["psi"], rtol=0.0, atol=1e-11)
 
 
-def test_a_bare_reference_ship_turns_in_as_many_ship_lengths_at_any_scale(
-    tanker: ShipModel,
-) -> None:
-    p = tanker.particulars
-    same = converted_model(tanker, p, tanker.steering, tanker.service_shaft_speed)
-    small = scale_model(same, 7.0)
-    factor = np.sqrt(7.0 / p.length)
-    large, little = (
-        turning_indices(
-            turning_circle(model, 35, duration=900 * f, dt=0.5 * f),
-            model.particulars.length,
-        )
-        for model, f in ((same, 1.0), (small, factor))
-    )
-    assert little.advance_lengths == pytest.approx(large.advance_lengths, rel=1e-9)
-    assert little.tactical_diameter_lengths == pytest.approx(
-        large.tactical_diameter_lengths, rel=1e-9
-    )
-
-
-def test_model_scale_and_full_scale_of_one_ship_are_nearly_similar(
-    kvlcc2: ShipModel,
-) -> None:
-    """What is left: the scale effect on the wake, another propeller and rounded
-    particulars.
-    """
-    model = shipgym.load_model("kvlcc2-l7")
-    bare = converted_model(
-        kvlcc2, model.particulars, model.steering, model.service_shaft_speed
-    )
-    ours, theirs = (
-        turning_indices(turning_circle(ship, 35, duration=140, dt=0.05), 7.0)
-        for ship in (bare, model)
-    )
-    assert ours.advance_lengths == pytest.approx(theirs.advance_lengths, rel=0.05)
-    assert ours.tactical_diameter_lengths == pytest.approx(
-        theirs.tactical_diameter_lengths, rel=0.05
-    )
-
-
 def test_accelerations_are_the_converted_ones_and_the_terms(
     bare: ShipModel, tanker: ShipModel
 ) -> None:
@@ -131,39 +89,6 @@ def test_accelerations_are_the_converted_ones_and_the_terms(
     ]
     found = model.derivatives([0.0, 0.0, 0.0, u, v, r, delta], [delta, n])[3:6]
     np.testing.assert_allclose(found, expected, rtol=1e-12)
-
-
-def test_a_memory_of_yaw_is_converted_as_the_state_it_is() -> None:
-    """It is a part of the yaw acceleration, which goes with the yaw rate squared."""
-    own = shipgym.load_model("mariner")
-    ship = nomoto2_ship(nomoto(own), own.particulars, own.steering)
-    small = converted_model(ship, scale_model(own, 7.0).particulars, own.steering)
-    state = {"u": 3.0, "v": 0.0, "r": 0.02, "q": 1e-4, "delta": 0.1}
-    found = small.dynamics.converted_accelerations(
-        {k: np.array([x]) for k, x in state.items()}, small.particulars
-    )
-    slopes = small.derivatives(
-        [state.get(name, 0.0) for name in small.state_names], [0.1]
-    )
-    rates = dict(zip(small.state_names, slopes, strict=True))
-    for name in ("r", "q"):
-        np.testing.assert_allclose(found[name], rates[name], rtol=1e-12)
-
-
-def test_the_grey_box_is_listed_among_the_structures() -> None:
-    assert "grey-box" in shipgym.list_structures()
-    with pytest.raises(InputError, match="Did you mean 'grey-box'"):
-        get_structure("gray-box")
-
-
-def test_a_grey_box_is_a_sound_ship_that_can_be_steered(
-    bare: ShipModel, tanker: ShipModel
-) -> None:
-    assert check_ship_model(bare).problems == ()
-    ours, theirs = nomoto(bare), nomoto(tanker)
-    p, q = bare.particulars, tanker.particulars
-    slower = (p["speed"] / p.length) / (q["speed"] / q.length)
-    assert pytest.approx(slower * theirs.K, rel=1e-3) == ours.K
 
 
 def test_the_file_of_a_grey_box_holds_the_reference_ship(
@@ -233,33 +158,3 @@ def test_what_cannot_be_a_reference_is_refused(
         replace(grey_box(tanker), quantity="force")
     with pytest.raises(InputError, match=r"some of 'u', 'v', 'r', .* got 'w'"):
         grey_box(tanker, {"w": "v"})
-
-
-def test_the_reference_ship_of_the_regression_is_the_one_that_sails(
-    bare: ShipModel,
-) -> None:
-    """Without terms the box accelerates as its converted reference ship, at several
-    states.
-    """
-    rng = np.random.default_rng(0)
-    channels = {
-        "u": rng.uniform(4.0, 8.0, 6),
-        "v": rng.uniform(-1.0, 1.0, 6),
-        "r": rng.uniform(-0.01, 0.01, 6),
-        "delta": rng.uniform(-0.5, 0.5, 6),
-        "n": rng.uniform(1.0, 2.0, 6),
-    }
-    box = bare.dynamics
-    found = box.converted_accelerations(
-        channels, bare.particulars, bare.service_shaft_speed
-    )
-    states = np.zeros((6, len(bare.state_names)))
-    for name in ("u", "v", "r", "delta"):
-        states[:, bare.state_names.index(name)] = channels[name]
-    rates = bare.derivatives(
-        states, np.stack([channels["delta"], channels["n"]], axis=-1)
-    )
-    for q in "uvr":
-        np.testing.assert_allclose(
-            found[q], rates[:, bare.state_names.index(q)], rtol=1e-9
-        )

@@ -3,16 +3,12 @@ shaft.
 """
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
 
 import shipgym
 from shipgym import InputError, UnstableModelError, load_model, manoeuvres
-from shipgym.engine import steered, trajectories
-from shipgym.engine.motion import Motion, Ship
-from shipgym.engine.specialise import Specialisation
 from shipgym.models.simulate import open_loop
 
 pytestmark = pytest.mark.interpreted
@@ -57,31 +53,6 @@ def test_a_rudder_ordered_beyond_its_limit_stays_at_the_limit():
     assert trial["delta"].max() == pytest.approx(
         np.radians(load_model("mariner").steering.rudder_limit_deg)
     )
-
-
-@pytest.mark.parametrize(
-    ("state", "command", "said"),
-    [
-        (
-            [0.0, 0.0, 0.0, np.nan, 0.0, 0.0, 0.0],
-            [0.0],
-            "state: expected finite numbers",
-        ),
-        (
-            [0.0, 0.0, 0.0, 7.0, 0.0, 0.0, 0.0],
-            [20.0],
-            r"command: row 0: expected a rudder in rad",
-        ),
-        (
-            [0.0, 0.0, 0.0, 7.0, 0.0, 0.0, 0.0],
-            [np.inf],
-            "command: row 0: expected finite numbers",
-        ),
-    ],
-)
-def test_derivatives_refuse_what_would_make_no_numbers(state, command, said):
-    with pytest.raises(InputError, match=said):
-        load_model("mariner").derivatives(state, command)
 
 
 @pytest.mark.parametrize(
@@ -154,48 +125,3 @@ def test_the_shaft_is_part_of_the_record_of_a_ship_without_shaft_lag():
     steps = manoeuvres.shaft_speed_steps(ship, duration=600)
     np.testing.assert_array_equal(steps["n"], steps["n_command"])
     assert "n" not in manoeuvres.zigzag(load_model("mariner"), duration=50).channels
-
-
-SHIP = Ship(*np.arange(1.0, 9.0))
-MOTION = Motion(*np.arange(11.0))
-
-
-def test_a_ship_is_changed_in_what_is_asked_for_alone():
-    gear = trajectories.with_gear(SHIP, 0.5, 0.25)
-    assert gear == SHIP._replace(rudder_limit=0.5, rudder_rate=0.25, gear_frequency=0.0)
-    assert trajectories.in_depth(SHIP, 20.0) == SHIP._replace(water_depth=20.0)
-    assert trajectories.replaced(MOTION, 1.0, 2.0, 3.0) == MOTION._replace(
-        psi=1.0, delta=2.0, n=3.0
-    )
-
-
-@pytest.mark.parametrize("command", [0.3, -0.3])
-def test_a_rudder_reverses_within_a_step_at_the_very_heading(command):
-    """Heading 0.3 t + 0.1 t^3 to the side of the order.
-
-    It passes 0.07 at 0.2293 s of 2 s.
-    """
-    asked = []
-
-    def turned(asked, motion, command, n, h, *more):
-        asked.append((command, h))
-        return motion._replace(
-            psi=motion.psi + command * h * (1.0 + h * h / 3.0), x=motion.x + h
-        )
-
-    switched = Specialisation({"sail_step": partial(turned, asked)}).copy(
-        steered.switched
-    )
-    start = Motion(*[0.0] * 11)
-    after = switched(start, command, 0.07, 1.0, 2.0, None, None, None)
-    time = np.roots([0.1, 0.0, 0.3, -0.07])
-    time = float(time[np.isreal(time)][0].real)
-    side = np.sign(command)
-    rest = 2.0 - time
-    assert asked[-2] == (command, pytest.approx(time, abs=1e-4))
-    assert asked[-1] == (-command, pytest.approx(rest, abs=1e-4))
-    assert after.psi == pytest.approx(
-        side * (0.07 - 0.3 * rest * (1.0 + rest * rest / 3.0)), abs=2e-4
-    )
-    assert after.x == pytest.approx(2.0)
-    assert len(asked) <= 15

@@ -5,12 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 import shipgym
 from shipgym import manoeuvres, scale_model
-from shipgym.engine import motion
-from shipgym.engine.motion import Ship
 from shipgym.models.catalogue import REFERENCE_SHIPS
 from shipgym.ships.inertia import inertia, rigid_inertia
 from shipgym.ships.term_table import Structure
@@ -63,30 +60,6 @@ def test_port_mirrors_starboard_on_a_ship_that_is_symmetric(name):
 
 
 @pytest.mark.parametrize("name", SHIPS)
-def test_place_and_heading_do_not_matter(name):
-    model = shipgym.load_model(name)
-    dt = ship_time(model) / 20
-    orders = np.repeat(model.service_command[None], 200, axis=0)
-    orders[:, 0] = 0.3
-    moved = model.service_state.copy()
-    moved[:3] = 5000.0, -8000.0, 2.0
-    here, there = model.simulate(orders, dt), model.simulate(orders, dt, moved)
-    for channel in set(model.state_names) - {"x", "y", "psi"}:
-        np.testing.assert_allclose(
-            there[channel], here[channel], rtol=1e-10, atol=1e-11
-        )
-    np.testing.assert_allclose(there["psi"] - 2.0, here["psi"], atol=1e-10)
-    c, s = np.cos(2.0), np.sin(2.0)
-    length = model.particulars["length"]
-    np.testing.assert_allclose(
-        there["x"] - 5000.0, c * here["x"] - s * here["y"], atol=1e-9 * length
-    )
-    np.testing.assert_allclose(
-        there["y"] + 8000.0, s * here["x"] + c * here["y"], atol=1e-9 * length
-    )
-
-
-@pytest.mark.parametrize("name", SHIPS)
 def test_halving_the_step_divides_the_error_by_sixteen(name):
     """With a rudder that starts off amidships and stays there, so that the motion is
     smooth."""
@@ -130,9 +103,8 @@ def kinetic_energy(model, trial):
     return energy
 
 
-@pytest.mark.parametrize("name", ["container", "tanker", "kvlcc2", "kvlcc2-l7"])
-@pytest.mark.parametrize("drift_deg", [-15.0, 0.0, 10.0])
-@pytest.mark.parametrize("turn", [-0.3, 0.0, 0.3])
+@pytest.mark.parametrize("name", ["container", "tanker", "kvlcc2"])
+@pytest.mark.parametrize(("drift_deg", "turn"), [(-15.0, 0.3), (0.0, 0.0), (10.0, 0.3)])
 def test_a_ship_without_thrust_loses_energy(name, drift_deg, turn):
     """From straight, drifting and turning states with the shaft at rest; heeling counts
     as stored energy."""
@@ -155,7 +127,7 @@ def test_a_ship_without_thrust_loses_energy(name, drift_deg, turn):
     "name",
     [name for name in SHIPS if isinstance(REFERENCE_SHIPS[name]().dynamics, Structure)],
 )
-@pytest.mark.parametrize("size", [1 / 23.0, 2.0])
+@pytest.mark.parametrize("size", [1 / 23.0])
 def test_a_ship_scaled_by_froude_sails_the_same_track_in_ship_lengths(name, size):
     """Speeds and times go with the root of the length."""
     ship = shipgym.load_model(name)
@@ -170,103 +142,6 @@ def test_a_ship_scaled_by_froude_sails_the_same_track_in_ship_lengths(name, size
     np.testing.assert_allclose(two["psi"], one["psi"], rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(two["x"] / size, one["x"], rtol=1e-8, atol=1e-6)
     np.testing.assert_allclose(two["u"] / np.sqrt(size), one["u"], rtol=1e-9)
-
-
-SHIP = Ship(100.0, 5.0, 0.6, 0.04, 0.5, 1.5, np.inf, 5.0)
-
-
-def linear(state, coefficients, ship):
-    """Accelerations that couple all velocities, the heel, the rudder and the shaft."""
-    u, v, r, p, phi, q, delta, n = state[3:]
-    return (
-        0.3 - 0.05 * u + 0.2 * v * r + 0.1 * n,
-        -0.2 * v - 1.5 * r + 0.6 * delta,
-        0.02 * v - 0.4 * r + 0.03 * delta + q,
-        -0.3 * p - 0.8 * phi + 0.1 * v,
-        -0.2 * q + 0.01 * delta,
-    )
-
-
-def test_a_step_sails_by_the_equations_of_motion_in_wind_and_current(monkeypatch):
-    """Position, heading, heel, memory of yaw, rudder with lag and shaft against SciPy's
-    integrator."""
-    monkeypatch.setattr(motion, "accelerations", linear)
-    monkeypatch.setattr(
-        motion, "shaft_acceleration", lambda n, command, *_: 0.3 * (command - n)
-    )
-    push = motion.Push(0.04, -0.03, 0.002, 0.01, 0.7, -0.4)
-    start = motion.Motion(
-        10.0, -20.0, 0.4, 4.0, 0.5, 0.03, 0.02, 0.15, 0.001, 0.05, 1.2
-    )
-    order, shaft, h, steps = 0.07, 0.9, 0.25, 40
-
-    def rates(_, state):
-        now = motion.Motion(*state)
-        udot, vdot, rdot, pdot, qdot = linear(now, None, SHIP)
-        level = np.cos(now.phi)
-        c, s = np.cos(now.psi), np.sin(now.psi)
-        return [
-            now.u * c - now.v * level * s + 0.7,
-            now.u * s + now.v * level * c - 0.4,
-            now.r * level,
-            udot + 0.04,
-            vdot - 0.03,
-            rdot + 0.002,
-            pdot + 0.01,
-            now.p,
-            qdot,
-            0.5 * (order - now.delta),
-            0.3 * (shaft - now.n),
-        ]
-
-    exact = solve_ivp(rates, (0.0, h * steps), start, rtol=1e-10, atol=1e-12).y[:, -1]
-    now = start
-    for _ in range(steps):
-        now = motion.sail(now, order, shaft, h, push, None, SHIP)
-    np.testing.assert_allclose(now, exact, rtol=1e-5, atol=1e-5)
-    one = motion.sail(start, order, shaft, h, push, None, SHIP)
-    there = solve_ivp(rates, (0.0, h), start, rtol=1e-11, atol=1e-13).y[:, -1]
-    np.testing.assert_allclose(
-        np.array(one) - start, there - start, rtol=1e-4, atol=1e-8
-    )
-
-
-def test_a_rudder_follows_its_order_by_lag_and_rate(monkeypatch):
-    """Time constant 2 s and 0.04 rad/s; without lag a ramp that ends at the order."""
-    assert motion.gear_rate(0.0, 0.05, SHIP) == pytest.approx(0.025)
-    assert motion.gear_rate(0.3, -0.3, SHIP) == -0.04
-    assert motion.rudder_after(0.1, 0.02, 9.0, 0.5, SHIP) == pytest.approx(0.11)
-    assert motion.rudder_velocity(0.0, 0.05, SHIP) == pytest.approx(0.025)
-    monkeypatch.setattr(motion, "HAS_LAG", False)
-    assert motion.gear_rate(0.0, 0.05, SHIP) == 0.0
-    assert motion.rudder_after(0.1, 0.0, 0.5, 2.0, SHIP) == pytest.approx(0.18)
-    assert motion.rudder_after(0.1, 0.0, -0.5, 2.0, SHIP) == pytest.approx(0.02)
-    assert motion.rudder_after(0.1, 0.0, 0.11, 2.0, SHIP) == pytest.approx(0.11)
-    velocities = [motion.rudder_velocity(0.1, order, SHIP) for order in (0.2, 0.1, 0.0)]
-    assert velocities == [0.04, 0.0, -0.04]
-
-
-@pytest.mark.parametrize(
-    ("velocities", "heel", "lost"),
-    [
-        ((14.9, 0.0, 0.0), 0.0, False),
-        ((15.1, 0.0, 0.0), 0.0, True),
-        ((12.0, 9.5, 0.0), 0.0, True),
-        ((5.0, 0.0, 0.29), 0.0, False),
-        ((5.0, 0.0, -0.31), 0.0, True),
-        ((5.0, 0.0, 0.0), 1.57, False),
-        ((5.0, 0.0, 0.0), -1.58, True),
-        ((np.nan, 0.0, 0.0), 0.0, True),
-        ((5.0, 0.0, np.nan), 0.0, True),
-    ],
-)
-def test_a_ship_is_lost_beyond_what_any_ship_does(velocities, heel, lost, monkeypatch):
-    """Three times service speed, six times U / L, a right angle of heel, or
-    no number."""
-    state = motion.Motion(0.0, 0.0, 0.0, *velocities, 0.0, heel, 0.0, 0.0, 0.0)
-    assert motion.lost(state, SHIP) == lost
-    monkeypatch.setattr(motion, "HAS_ROLL", False)
-    assert motion.lost(state, SHIP) == (lost and heel == 0.0)
 
 
 def test_inertia_of_each_ship_is_that_of_her_source():
@@ -306,23 +181,3 @@ def test_inertia_of_each_ship_is_that_of_her_source():
     np.testing.assert_allclose(
         in_tons, [1.05 + 0.05 * shallow, 2.02 + 0.387 * shallow, yaw]
     )
-
-
-def test_inertia_of_a_table_is_that_of_the_particulars():
-    """With the centre of gravity off midship: mass, static moment, Steiner's part and
-    added mass."""
-    mariner = shipgym.load_model("mariner")
-    ship = replace(mariner.particulars, mass=2e7, xg=-3.0, yaw_gyradius=40.0)
-    ship = replace(
-        ship, X_udot=-1e-3, Y_vdot=-8e-3, Y_rdot=-1e-4, N_vdot=-2e-4, N_rdot=-5e-4
-    )
-    model = replace(mariner, particulars=ship)
-    unit, L = 0.5 * ship.require("water_density") * ship.length**3, ship.length
-    yaw = 2e7 * (40.0**2 + 9.0)
-    expected = [
-        [2e7 + 1e-3 * unit, 0.0, 0.0, 0.0],
-        [0.0, 2e7 + 8e-3 * unit, -6e7 + 1e-4 * unit * L, 0.0],
-        [0.0, -6e7 + 2e-4 * unit * L, yaw + 5e-4 * unit * L**2, 0.0],
-    ]
-    np.testing.assert_allclose(inertia(model), expected, rtol=1e-9)
-    assert rigid_inertia(model) == pytest.approx((2e7, -6e7, yaw))

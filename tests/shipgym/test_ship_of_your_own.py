@@ -3,7 +3,6 @@
 The one of its documentation page.
 """
 
-import math
 import pickle
 import re
 import subprocess
@@ -11,7 +10,6 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,8 +22,6 @@ from shipgym import (
     manoeuvres,
     register_ship_equations,
 )
-from shipgym.engine.motion import Motion, Ship
-from shipgym.errors import UnstableModelError
 from shipgym.models.linear import nomoto
 from shipgym.ships.structures import REGISTERED_EQUATIONS
 
@@ -79,23 +75,6 @@ def test_she_is_known_by_name_in_files_and_in_other_processes(
         check=True,
     )
     assert float(told.stdout) == model.simulate([[0.1, 2.3]] * 20, 0.5)["r"][-1]
-
-
-def test_her_annotations_may_be_texts(tug: Path, tmp_path: Path) -> None:
-    head, end, rest = TUG.replace('"tug"', '"towboat"').partition('"""\n\n')
-    path = tmp_path / "towboat.py"
-    path.write_text(
-        f"{head}{end}from __future__ import annotations\n{rest}", encoding="utf-8"
-    )
-    own, texts = load_model(tug), load_model(path)
-    read = [
-        ship.dynamics.coefficients_record.__annotations__["T_shaft"] is float
-        for ship in (own, texts)
-    ]  # type: ignore[union-attr]
-    assert read == [True, False]
-    np.testing.assert_array_equal(
-        *(ship.derivatives(own.service_state, [0.1, 2.0]) for ship in (own, texts))
-    )
 
 
 def test_changed_coefficients_compile_nothing_anew(tug: Path) -> None:
@@ -215,20 +194,6 @@ def test_what_is_wrong_with_her_is_said(
     assert re.search(message, found.problems[0], re.DOTALL), found.problems[0]
 
 
-@pytest.mark.compiled
-def test_a_ship_that_runs_away_may_have_equations_without_a_result(tug: Path) -> None:
-    tug.write_text(
-        TUG.replace("fabs(u) * u", "fabs(u) * u / (fabs(motion.delta) < 0.2)"),
-        encoding="utf-8",
-    )
-    model = load_model(tug)
-    with pytest.raises(
-        UnstableModelError,
-        match=r"or her equations give no number .check_ship_model says",
-    ):
-        model.simulate([[0.5, 2.3]] * 40, 0.5)
-
-
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(
         InputError,
@@ -238,46 +203,3 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
         ),
     ):
         load_model(tmp_path / "barge.py")
-
-
-def test_her_equations_are_tried_in_a_turn_in_deep_water(tug: Path) -> None:
-    """At nine tenths of her service speed, drifting and turning, so that no term is
-    left out by a zero.
-    """
-    ship = register_ship_equations(tug)
-    seen: list[tuple[Motion, Ship]] = []
-    shafts: list[tuple[float, float]] = []
-
-    def accelerations(
-        motion: Motion, c: Any, ship: Ship
-    ) -> tuple[float, float, float, float, float]:
-        seen.append((motion, ship))
-        return 0.0, 0.0, 0.0, 0.0, 0.0
-
-    def shaft(n: float, command: float, c: Any, ship: Ship) -> float:
-        shafts.append((n, command))
-        return 0.0
-
-    replace(ship, accelerations=accelerations, shaft_acceleration=shaft)
-    ((motion, her),) = seen
-    length, speed, n = (
-        ship.particulars["length"],
-        ship.particulars["speed"],
-        ship.service_shaft_speed,
-    )
-    assert her == Ship(
-        length, speed, ship.steering.limit, ship.steering.rate, 0.0, n, math.inf, speed
-    )
-    assert (motion.u, motion.v, motion.r) == (
-        0.9 * speed,
-        0.1 * speed,
-        0.1 * speed / length,
-    )
-    assert (motion.psi, motion.delta, motion.p, motion.phi, motion.n) == (
-        0.1,
-        0.1,
-        0.01,
-        0.01,
-        n,
-    )
-    assert shafts == [(n, 0.9 * n)]

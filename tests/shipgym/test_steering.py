@@ -1,10 +1,8 @@
 """The steering gear's limits, in degrees outside and radians inside."""
 
-import json
 import math
 from dataclasses import replace
 
-import gymnasium
 import numpy as np
 import pytest
 
@@ -20,29 +18,12 @@ def test_limit_and_rate_are_in_radians():
     assert SteeringGear.from_mapping(gear.to_dict()) == gear
 
 
-def test_solas_asks_for_the_default_rate():
-    gear = SteeringGear()
-    assert (
-        (35.0 + 30.0) / gear.rudder_rate_deg_s <= 28.0
-    )  # from 35 deg to 30 deg on the other side, SOLAS II-1/29
-    assert gear.time_constant == 0.0
-
-
-def test_numbers_of_numpy_are_plain_ones_in_files():
-    gear = SteeringGear(np.float32(35.0), np.int64(3), np.float32(0.5))
-    assert json.loads(json.dumps(gear.to_dict())) == {
-        "rudder_limit_deg": 35.0,
-        "rudder_rate_deg_s": 3.0,
-        "time_constant": 0.5,
-    }
-
-
 def kvlcc2_with(lag):
     ship = load_model("kvlcc2")
     return replace(ship, steering=replace(ship.steering, time_constant=lag))
 
 
-@pytest.mark.parametrize("lag", [0.01, 0.3, 1.0, 6.0])
+@pytest.mark.parametrize("lag", [0.01, 1.0])
 @pytest.mark.parametrize("step", [0.5, 4.0])
 def test_the_rudder_settles_at_its_order_however_short_its_lag(lag, step):
     """Runge-Kutta alone would chatter, or settle elsewhere, where a lag is shorter than
@@ -52,23 +33,6 @@ def test_the_rudder_settles_at_its_order_however_short_its_lag(lag, step):
     delta = trial["delta"][trial.t >= 30.0 + 10.0 * lag]
     np.testing.assert_allclose(delta[-20:], 0.2, rtol=1e-6)
     assert np.all(np.diff(trial["delta"]) > -1e-12)
-
-
-def test_an_environment_follows_a_short_lag():
-    """In steps of two seconds.
-
-    There, one of 0.45 of a step and a shorter one are the same.
-    """
-    rudders = []
-    for lag in (0.1, 0.9):
-        env = gymnasium.make("shipgym/CourseKeeping-v0", model=kvlcc2_with(lag))
-        env.reset(seed=0)
-        rudders.append([])
-        for _ in range(12):
-            env.step(np.array([0.4], dtype=np.float32))
-            rudders[-1].append(env.unwrapped.physical_state()["delta"])
-    assert rudders[0] == rudders[1]
-    assert rudders[0][-1] == pytest.approx(0.4 * math.radians(35.0), rel=1e-4)
 
 
 @pytest.mark.parametrize(
