@@ -40,7 +40,6 @@ __all__ = [
     "BenchmarkTask",
     "Suite",
     "find_task",
-    "list_suites",
     "load_suite",
     "load_tuned",
     "parse_suite",
@@ -101,11 +100,6 @@ class Suite:
         return sets or [self.task(name)]
 
 
-def list_suites() -> list[str]:
-    """Return the names of the shipped suites."""
-    return sorted(path.stem for path in FOLDER.glob("*.toml"))
-
-
 def load_suite(
     suite: str | Path = DEFAULT_SUITE, allow_code: Collection[str] = ()
 ) -> Suite:
@@ -127,7 +121,6 @@ def load_suite(
     where = str(suite)
     if not where.endswith(".toml"):
         return _shipped(where)
-
     path = Path(where).resolve()
     largest_suite = 1_000_000  # bytes
     content = read_bytes(path, "TOML file of a suite", largest_suite)
@@ -135,20 +128,18 @@ def load_suite(
         text = content.decode()
     except UnicodeDecodeError:
         raise InputError(f"{where}: expected UTF-8, got other bytes") from None
-    return parse_suite(
-        text,
-        where,
-        folder=path.parent,
-        allow_code=allow_code,
-        source=str(path),
-    )
+    found = parse_suite(text, where, path.parent, allow_code, source=str(path))
+    for task in found.tasks:
+        with placed(f"{where}: tasks.{task.design_name}"):
+            task.check_ship()
+    return found
 
 
 @cache
 def _shipped(name: str) -> Suite:
-    check_choice(name, list_suites(), "suite", " or the path of a TOML file")
+    check_choice(name, (DEFAULT_SUITE,), "suite", " or the path of a TOML file")
     text = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
-    return _read_suite(text, f"suite '{name}'", _Reader(FOLDER), source=name)
+    return parse_suite(text, f"suite '{name}'", FOLDER, source=name)
 
 
 def find_task(
@@ -202,20 +193,13 @@ def parse_suite(
     allow_code: Collection[str] = (),
     source: str = "",
 ) -> Suite:
-    """Read a suite from its TOML text, and check its models and ships.
+    """Read a suite from its TOML text; its models and ships are loaded when used.
 
     `where` begins the messages, `folder` is where relative paths begin, `source` the
     `Suite.source`; for `allow_code` see `load_suite`. Raises InputError naming the
     field at fault.
     """
-    suite = _read_suite(text, where, _Reader(folder, allow_code), source)
-    for task in suite.tasks:
-        with placed(f"{where}: tasks.{task.design_name}"):
-            task.check_ship()
-    return suite
-
-
-def _read_suite(text: str, where: str, reader: "_Reader", source: str) -> Suite:
+    reader = _Reader(folder, allow_code)
     content = parse_toml(text, f"{where}:")
     check_keys(content, ("name", "tasks"), where)
     name = check_text(content.get("name"), f"{where}: name")
@@ -228,13 +212,8 @@ def _read_suite(text: str, where: str, reader: "_Reader", source: str) -> Suite:
         task = reader.read(task_name, table, field)
         tasks += _sets_of(replace(task, suite=source))
 
-    digest = hashlib.sha256(text.encode())
-    return Suite(
-        name=name,
-        tasks=tuple(tasks),
-        source=source,
-        sha256=digest.hexdigest(),
-    )
+    sha256 = hashlib.sha256(text.encode()).hexdigest()
+    return Suite(name, tuple(tasks), source, sha256)
 
 
 @dataclass(frozen=True)
