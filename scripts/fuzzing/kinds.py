@@ -36,7 +36,6 @@ from agents.training.run_folder import resumed
 from agents.training.settings import load_settings, read_settings_file
 from fuzzing.reading import Kind
 from shipgym import Episode, ShipFile, ShipModel, Trial, load_model
-from shipgym.envs.episode_file import to_file
 from shipgym.files import LARGEST_TOML, read_bytes
 from shipgym.tasks.task import Task
 from shipgym.trials.guesses import guess_trial
@@ -91,8 +90,7 @@ def use_results(result: Any) -> None:
 
 
 def use_episode(episode: Episode) -> None:
-    """As a trial, and its file."""
-    written(to_file(vars(episode)))
+    """As a trial."""
     if episode.n_steps > 1:
         episode.to_trial()
 

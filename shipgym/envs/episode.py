@@ -1,7 +1,10 @@
-"""Episode of an environment: record of ship and agent, to be stored and replayed."""
+"""Episode of an environment: record of ship and agent, to be stored and replayed.
+
+Its file is JSON: `format`, `kind` ("episode") and the fields of `Episode`.
+"""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Self
 
@@ -12,20 +15,26 @@ from shipgym.arrays import Floats
 from shipgym.checks import (
     check_finite,
     check_flag,
+    check_format,
+    check_keys,
     check_number,
     check_table,
     check_text,
     check_whole,
     placed,
     quoted,
+    unexpected,
 )
-from shipgym.envs.episode_file import from_file, to_file
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
 from shipgym.tasks.guidance import Path as PlannedPath
 from shipgym.tasks.guidance import track
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
+
+FORMAT = 2
+KIND = "episode"
+SERIES = ("states", "commands", "reward_parts", "info")
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,66 +115,44 @@ class Episode:
         check_whole(self.number, "number", at_least=0)
         if self.seed is not None:
             check_whole(self.seed, "seed", at_least=0)
-        check_flag(self.terminated, "terminated")
-        check_flag(self.truncated, "truncated")
-        if self.success is not None:
-            check_flag(self.success, "success")
-
-        self._set_positive("dt")
-        self._set_positive("length")
-        self._set_positive("rudder_limit", at_most=np.pi / 2.0)
-        if self.beam is not None:
-            self._set_positive("beam", at_most=self.length)
-        if self.corridor is not None:
-            self._set_positive("corridor")
-        if self.turn_radius is not None:
-            self._set_positive("turn_radius")
+        for name in ("terminated", "truncated", "success"):
+            if name != "success" or self.success is not None:
+                check_flag(getattr(self, name), name)
+        largest = {"rudder_limit": np.pi / 2.0, "beam": self.length}
+        for name in ("dt", "length", *largest, "corridor", "turn_radius"):
+            value = getattr(self, name)
+            is_optional = name in ("beam", "corridor", "turn_radius")
+            if not is_optional or value is not None:
+                at_most = largest.get(name)
+                self._set(name, check_number(value, name, above=0.0, at_most=at_most))
         self._set_series()
         if self.waypoints is not None:
-            self._set_path(self.waypoints)
-
-    def _set_path(self, waypoints: Floats) -> None:
-        path = PlannedPath(waypoints)
-        self._set("waypoints", path.waypoints)
-        if self.turn_radius is not None:
-            path.check_turns(self.turn_radius)
-
-    def _set_positive(self, name: str, at_most: float | None = None) -> None:
-        value = getattr(self, name)
-        self._set(name, check_number(value, name, above=0.0, at_most=at_most))
+            path = PlannedPath(self.waypoints)
+            self._set("waypoints", path.waypoints)
+            if self.turn_radius is not None:
+                path.check_turns(self.turn_radius)
 
     def _set_series(self) -> None:
-        rewards = series(self.rewards, "rewards", None)
-        n_steps = len(rewards)
+        """Store series as read-only arrays; InputError where they do not fit."""
+        rewards = check_finite(self.rewards, "rewards")
+        n_steps = rewards.size
         if n_steps == 0:
             raise InputError("rewards: expected at least one step, got none")
+        self._set("rewards", _series(rewards, "rewards", (n_steps,)))
         actions = check_finite(self.actions, "actions")
-        if actions.ndim != 2 or len(actions) != n_steps:
+        shape = (n_steps, *(actions.shape[1:] or (1,)))
+        self._set("actions", _series(actions, "actions", shape[:2]))
+        for group in SERIES:
+            count = n_steps + 1 if group in ("states", "info") else n_steps
+            arrays = {}
+            for name, values in check_table(getattr(self, group), group).items():
+                arrays[name] = _series(values, f"{group}.{name}", (count,))
+            self._set(group, arrays)
+        needed = ("x", "y", "psi", "delta")
+        if not self.states.keys() >= set(needed):
             raise InputError(
-                f"actions: expected shape ({n_steps}, n_actions), a row for each"
-                f" reward, got {actions.shape}"
+                f"states: expected {quoted(needed)} at least, got {quoted(self.states)}"
             )
-        self._set("rewards", rewards)
-        self._set("actions", actions)
-        self._set_table("states", n_steps + 1)
-        self._set_table("info", n_steps + 1)
-        self._set_table("commands", n_steps)
-        self._set_table("reward_parts", n_steps)
-        # Channels that are required of any ship.
-        required_states = ("x", "y", "psi", "delta")
-        missing = [name for name in required_states if name not in self.states]
-        if missing:
-            raise InputError(
-                f"states: expected {quoted(required_states)} at least, got"
-                f" {quoted(self.states)}"
-            )
-
-    def _set_table(self, group: str, count: int) -> None:
-        """Check series by name, each of shape (count,)."""
-        arrays = {}
-        for name, values in check_table(getattr(self, group), group).items():
-            arrays[name] = series(values, f"{group}.{name}", count)
-        self._set(group, arrays)
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
@@ -216,7 +203,10 @@ class Episode:
 
     def save(self, path: str | Path) -> None:
         """Write the episode as JSON, atomically; InputError where that fails."""
-        write_json(to_file(vars(self)), Path(path), indent=None)
+        content: dict[str, Any] = {"format": FORMAT, "kind": KIND}
+        for name, value in vars(self).items():
+            content[name] = _listed(value)
+        write_json(content, Path(path), indent=None)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -225,18 +215,29 @@ class Episode:
         Raises InputError, naming the file and the field at fault.
         """
         remedy = "record the episode again or take another copy"
-        content = read_json(Path(path), "recorded episode", remedy)
+        content = dict(read_json(Path(path), "recorded episode", remedy))
         with placed(str(path)):
-            return cls(**from_file(content))
+            kind = content.pop("kind", None)
+            if kind != KIND:
+                remedy = "choose a file that RecordEpisode wrote"
+                raise unexpected("kind", repr(KIND), kind, remedy)
+            check_format(content, FORMAT, KIND)
+            content.pop("format", None)
+            names = [field.name for field in fields(cls)]
+            check_keys(content, names, KIND, required=names)
+            return cls(**content)
 
 
-def series(values: ArrayLike, where: str, count: int | None) -> Floats:
-    """Finite numbers over time as a read-only array of shape (count,).
-
-    InputError for others.
-    """
+def _series(values: ArrayLike, where: str, shape: tuple[int, ...]) -> Floats:
+    """Finite numbers as a read-only array of a shape; InputError for others."""
     array = check_finite(values, where)
-    if array.ndim != 1 or (count is not None and len(array) != count):
-        length = "n_steps" if count is None else count
-        raise InputError(f"{where}: expected shape ({length},), got {array.shape}")
+    if array.shape != shape:
+        raise InputError(f"{where}: expected shape {shape}, got {array.shape}")
     return array
+
+
+def _listed(value: Any) -> Any:
+    """Arrays as lists, also within a mapping."""
+    if isinstance(value, Mapping):
+        return {key: _listed(entry) for key, entry in value.items()}
+    return value.tolist() if isinstance(value, np.ndarray) else value

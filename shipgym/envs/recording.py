@@ -1,7 +1,7 @@
 """Episodes of an environment written to files, for replay and identification."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from glob import escape
 from pathlib import Path
 from typing import Any, SupportsFloat, TypeVar
@@ -20,7 +20,6 @@ Observation = TypeVar("Observation")
 Action = TypeVar("Action")
 
 REWARD = "reward_"  # prefix of the names of the parts of the reward in info
-SUCCESS = ("success", "is_success")
 
 
 class RecordEpisode(
@@ -141,22 +140,15 @@ class _Recorded:
         info: Mapping[str, Any],
     ) -> None:
         ship: Any = env.unwrapped
+        model: ShipModel = ship.model
+        seed = ship.np_random_seed
+        if seed is not None and seed < 0:  # of a generator set by hand
+            seed = None
         self._ship = ship
         self._actions: list[Floats] = []
         self.rewards: list[float] = []
         self._states: list[dict[str, float]] = [ship.physical_state()]
-        self._parts: list[dict[str, float]] = []
-        self._numbers = [_numbers(info)]
-        self._outcome: dict[str, Any] = {}
-
-        model: ShipModel = ship.model
-        self._command_names = model.command_names
-        seed = ship.np_random_seed
-        if seed is not None and seed < 0:  # of a generator set by hand
-            seed = None
-        waypoints = getattr(ship, "waypoints", None)
-        if waypoints is not None:
-            waypoints = np.array(waypoints, dtype=float)
+        self._infos = [info]
         self._facts: dict[str, Any] = {
             "environment": env.spec.id if env.spec else type(ship).__name__,
             "arguments": plain(env.spec.kwargs) if env.spec else {},
@@ -166,10 +158,10 @@ class _Recorded:
             "seed": seed,
             "length": model.particulars["length"],
             "beam": model.particulars["beam"],
-            "rudder_limit": math.radians(model.steering.rudder_limit_deg),
-            "waypoints": waypoints,
-            "turn_radius": getattr(ship, "turn_radius", None),
-            "corridor": getattr(ship, "corridor", None),
+            "rudder_limit": model.steering.limit,
+            "waypoints": ship.waypoints,
+            "turn_radius": ship.turn_radius,
+            "corridor": ship.corridor,
         }
 
     def add(
@@ -184,64 +176,38 @@ class _Recorded:
         self._actions.append(np.array(action, dtype=float).reshape(-1))
         self.rewards.append(reward)
         self._states.append(self._ship.physical_state())
-        self._numbers.append(_numbers(info))
-        parts = {}
-        for name, value in info.items():
-            if name.startswith(REWARD):
-                parts[name] = float(value)
-        self._parts.append(parts)
-        self._outcome = {
-            "terminated": bool(terminated),
-            "truncated": bool(truncated),
-            "success": _success(info),
-        }
+        self._infos.append(info)
+        success = info.get("success")
+        self._facts["terminated"] = bool(terminated)
+        self._facts["truncated"] = bool(truncated)
+        self._facts["success"] = None if success is None else bool(success)
 
     def episode(self) -> Episode:
         """Make the episode."""
         states = _columns(self._states)
-        commands = {}
-        for name in self._command_names:
-            commands[name] = states[f"{name}_command"][1:]
+        numbers = _columns(self._infos)
+        parts = [name for name in numbers if name.startswith(REWARD)]
+        commands = self._ship.model.command_names
         return Episode(
             states=states,
             actions=np.array(self._actions),
             rewards=np.array(self.rewards),
-            commands=commands,
-            reward_parts=_columns(self._parts),
-            info=_columns(self._numbers),
+            commands={name: states[f"{name}_command"][1:] for name in commands},
+            reward_parts={name: numbers.pop(name)[1:] for name in parts},
+            info=numbers,
             **self._facts,
-            **self._outcome,
         )
 
 
-def _success(info: Mapping[str, Any]) -> bool | None:
-    """Success that `info` reports; None without one."""
-    for name in SUCCESS:
-        success = info.get(name)
-        if success is not None:
-            return bool(success)
-    return None
-
-
-def _numbers(info: Mapping[str, Any]) -> dict[str, float]:
-    """Finite numbers in `info`, without the parts of the reward and the success."""
-    numbers = {}
-    for name, value in info.items():
-        if name.startswith(REWARD) or name in SUCCESS:
-            continue
-        is_number = isinstance(value, (bool, int, float, np.number, np.bool_))
-        if is_number and math.isfinite(value):
-            numbers[name] = float(value)
-    return numbers
-
-
-def _columns(rows: list[dict[str, float]]) -> dict[str, Floats]:
-    """Values over time by name; a name that some step lacks is left out."""
+def _columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, Floats]:
+    """Finite numbers over time by name; true is 1, and success is left out."""
     columns = {}
-    for name in rows[-1]:
-        if all(name in row for row in rows):
-            columns[name] = np.array([row[name] for row in rows], dtype=float)
-    return columns
+    for name in rows[-1].keys() - {"success"}:
+        values = [row.get(name) for row in rows]
+        is_number = all(isinstance(one, int | float | np.number) for one in values)
+        if is_number and np.isfinite(np.array(values, dtype=float)).all():
+            columns[name] = np.array(values, dtype=float)
+    return {name: columns[name] for name in rows[-1] if name in columns}
 
 
 def _check_environment(env: Any) -> None:

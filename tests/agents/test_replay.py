@@ -223,7 +223,7 @@ def test_the_command_writes_the_page(recorded):
         ('{"name": "mariner", "format": 1}', "kind: expected 'episode', got None"),
         (
             '{"kind": "episode", "format": 9}',
-            "expected format 1, which this version of shipgym reads, got 9",
+            "expected format 2, which this version of shipgym reads, got 9",
         ),
     ],
 )

@@ -86,102 +86,54 @@ def test_an_episode_cannot_be_changed():
 
 
 @pytest.mark.parametrize(
-    ("place", "value", "said"),
+    ("name", "value", "said"),
     [
-        (
-            ("format",),
-            2,
-            "expected format 1, which this version of shipgym reads, got 2",
-        ),
-        (("kind",), None, "kind: expected 'episode', got None"),
-        (("dt",), 0, "dt: expected a number > 0"),
-        (("dt",), "1", "dt: expected a number > 0, got '1'"),
-        (
-            ("dt",),
-            2**64,
-            ("dt: expected an integer of at most 64 bits"),
-        ),
-        (("model",), "", "model: expected"),
-        (("model",), "m" * 5000, "model: expected at most 4096 characters, got 5000"),
-        (("seed",), -1, "seed: expected an integer of at least 0"),
-        (("number",), 1.5, "number: expected"),
-        (
-            ("ship", "beam"),
-            500.0,
-            "beam: expected a number > 0 and <= 160.93",
-        ),
-        (("ship", "beem"), 1.0, "ship: unknown key 'beem'. Did you mean 'beam'?"),
-        (("path", "corridor"), -5.0, "corridor: expected"),
-        (("path", "waypoints"), [[0.0, 0.0]], "waypoints: expected at least 2 rows"),
-        (("states", "x"), [0.0, 1.0], "states.x: expected shape (5,), got (2,)"),
-        (
-            ("states", "x"),
-            [0.0, 1.0, None, 2.0, 3.0],
-            "states.x[2]: expected a number",
-        ),
-        (("states", "x"), [0.0, 1.0, True, 2.0, 3.0], "states.x[2]: expected"),
-        (
-            ("info", "cross_track"),
-            [0.0] * STEPS,
-            "info.cross_track: expected shape (5,), got (4,)",
-        ),
-        (("commands", "delta"), 0.1, "commands.delta: expected a list"),
-        (
-            ("actions",),
-            [[0.1], [0.2]],
-            "actions: expected shape (4, n_actions), a row for each reward, got (2, 1)",
-        ),
-        (
-            ("actions",),
-            [[0.1], [0.2, 0.3], [0.1], [0.1]],
-            "actions[1]: expected a list of 1 numbers",
-        ),
-        (("rewards",), [], "rewards: expected at least one step, got none"),
-        (
-            ("rewards",),
-            [1.0, float("nan"), 1.0, 1.0],
-            "rewards[1]: expected a number",
-        ),
-        (("outcome", "success"), "yes", "success: expected a boolean"),
-        (
-            ("states",),
-            {"x": [0.0] * 5},
-            "states: expected 'x', 'y', 'psi', 'delta' at least, got 'x'",
-        ),
-        (("note",), "", "unknown key 'note'"),
+        ("format", 1, "expected format 2, which this version of shipgym reads, got 1"),
+        ("kind", "model", "kind: expected 'episode', got 'model'; choose a file"),
+        ("dt", 0, "dt: expected a number > 0"),
+        ("dt", "1", "dt: expected a number > 0, got '1'"),
+        ("rudder_limit", 1.58, "rudder_limit: expected a number > 0 and <= 1.5708"),
+        ("model", "", "model: expected"),
+        ("seed", -1, "seed: expected an integer of at least 0"),
+        ("number", 1.5, "number: expected"),
+        ("beam", 500.0, "beam: expected a number > 0 and <= 160.93"),
+        ("beem", 1.0, "unknown key 'beem'. Did you mean 'beam'?"),
+        ("corridor", -5.0, "corridor: expected"),
+        ("waypoints", [[0.0, 0.0]], "waypoints: expected at least 2 rows"),
+        ("states", {"x": [0.0, 1.0]}, "states.x: expected shape (5,), got (2,)"),
+        ("states", {"x": [0.0] * 5}, "states: expected 'x', 'y', 'psi', 'delta'"),
+        ("states", {"x": [0.0, None] * 2}, "states.x: expected finite numbers, got"),
+        ("info", {"a": [0.0] * STEPS}, "info.a: expected shape (5,), got (4,)"),
+        ("commands", {"delta": 0.1}, "commands.delta: expected shape (4,), got ()"),
+        ("actions", [[0.1], [0.2]], "actions: expected shape (4, 1), got (2, 1)"),
+        ("rewards", [], "rewards: expected at least one step, got none"),
+        ("success", "yes", "success: expected a boolean"),
+        ("arguments", ["mariner"], "arguments: expected a table of keys and values"),
+        ("turn_radius", 4e4, "waypoints"),
     ],
 )
-def test_a_wrong_field_is_named_with_its_file(tmp_path, place, value, said):
+def test_a_wrong_field_is_named_with_its_file(tmp_path, name, value, said):
     path = tmp_path / "episode.json"
-    EPISODE.save(path)
+    corner = [[0.0, 0.0], [1000.0, 0.0], [1000.0, 1000.0]]
+    replace(EPISODE, waypoints=corner).save(path)
     content = json.loads(path.read_text())
-    *tables, key = place
-    table = content
-    for name in tables:
-        table = table[name]
-    table[key] = value
-    path.write_text(json.dumps(content))
+    path.write_text(json.dumps(content | {name: value}))
     with pytest.raises(
         InputError, match=f"^{re.escape(f'{path}: ')}.*{re.escape(said)}"
     ):
         Episode.load(path)
 
 
-@pytest.mark.parametrize("name", ["states", "outcome", "dt"])
-def test_a_missing_field_is_named(tmp_path, name):
+def test_a_missing_field_and_a_file_cut_short_are_told(tmp_path):
     path = tmp_path / "episode.json"
     EPISODE.save(path)
-    content = json.loads(path.read_text())
-    del content[name]
+    whole = path.read_text()
+    content = json.loads(whole)
+    del content["states"]
     path.write_text(json.dumps(content))
-    with pytest.raises(InputError, match=f"'{name}' is missing"):
+    with pytest.raises(InputError, match="'states' is missing"):
         Episode.load(path)
-
-
-def test_a_file_cut_in_half_is_told_so(tmp_path):
-    path = tmp_path / "episode.json"
-    EPISODE.save(path)
-    path.write_text(path.read_text()[:200])
+    path.write_text(whole[:200])
     with pytest.raises(InputError, match="cut short"):
         Episode.load(path)
     with pytest.raises(InputError, match="there is no such recorded episode"):
@@ -203,64 +155,6 @@ def test_the_path_of_an_episode_is_drawn_with_its_turns():
     )
     assert replace(EPISODE, waypoints=corner, turn_radius=None).path.tolist() == corner
     assert replace(EPISODE, waypoints=None, turn_radius=None).path is None
-    with pytest.raises(
-        InputError, match=r"rows 0 and 1: expected a distance of at least 1200 m"
-    ):
-        replace(episode, turn_radius=1200.0)
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        (
-            {"environment": " "},
-            "environment: expected a non-empty string",
-        ),
-        ({"length": None}, "length: expected a number > 0"),
-        ({"dt": None}, "dt: expected a number > 0"),
-        (
-            {"rudder_limit": 1.58},
-            "rudder_limit: expected a number > 0 and <= 1.5708",
-        ),
-        ({"beam": 160.94}, "beam: expected a number > 0 and <= 160.93"),
-        ({"corridor": 0.0}, "corridor: expected a number > 0"),
-        ({"turn_radius": -1.0}, "turn_radius: expected a number > 0"),
-        (
-            {"arguments": ["mariner"]},
-            "arguments: expected a table of keys and values",
-        ),
-        ({"number": -1}, "number: expected an integer of at least 0"),
-        ({"seed": 1.0}, "seed: expected an integer of at least 0"),
-        ({"terminated": None}, "terminated: expected a boolean"),
-        ({"truncated": 1}, "truncated: expected a boolean"),
-        ({"success": 0}, "success: expected a boolean"),
-        (
-            {"actions": np.zeros(STEPS)},
-            "actions: expected shape (4, n_actions), a row for each reward, got (4,)",
-        ),
-        (
-            {"rewards": np.zeros((STEPS, 1))},
-            "rewards: expected shape (n_steps,), got (4, 1)",
-        ),
-        (
-            {"rewards": np.zeros(0)},
-            "rewards: expected at least one step, got none",
-        ),
-        (
-            {"commands": {"n": np.zeros(STEPS + 1)}},
-            "commands.n: expected shape (4,), got (5,)",
-        ),
-        (
-            {"reward_parts": {"end": np.zeros(STEPS + 1)}},
-            "reward_parts.end: expected shape (4,), got (5,)",
-        ),
-        ({"info": [1.0]}, "info: expected a table of keys and values"),
-    ],
-)
-def test_an_episode_that_cannot_be_is_refused(changes, said):
-    with pytest.raises(InputError) as caught:
-        replace(EPISODE, **changes)
-    assert str(caught.value).startswith(said)
 
 
 def test_what_need_not_be_known_may_be_left_out():
@@ -271,28 +165,3 @@ def test_what_need_not_be_known_may_be_left_out():
     assert (bare.n_steps, bare.number, bare.rudder_limit) == (STEPS, 3, 0.7)
     assert replace(bare, rudder_limit=np.pi / 2.0, beam=160.93, number=0).number == 0
     assert "delta_command" not in bare.to_trial()
-
-
-@pytest.mark.parametrize("changes", [{}, {"turn_radius": None}, {"waypoints": None}])
-def test_a_path_is_told_as_far_as_there_is_one(tmp_path, changes):
-    episode = replace(EPISODE, **changes)
-    episode.save(tmp_path / "episode.json")
-    path = json.loads((tmp_path / "episode.json").read_text())["path"]
-    assert (path is None) == ("waypoints" in changes)
-    if path is not None:
-        assert path.keys() == {"waypoints", "corridor", "turn_radius"} - changes.keys()
-        assert (
-            Episode.load(tmp_path / "episode.json").turn_radius == episode.turn_radius
-        )
-    else:
-        assert Episode.load(tmp_path / "episode.json").waypoints is None
-    assert (tmp_path / "episode.json").read_text().count("\n") == 1  # all in one line
-
-
-def test_a_file_of_another_kind_is_told_so(tmp_path):
-    (tmp_path / "model.json").write_text('{"kind": "model", "format": 7}')
-    with pytest.raises(
-        InputError,
-        match=r"kind: expected 'episode', got 'model'; choose a file that",
-    ):
-        Episode.load(tmp_path / "model.json")
