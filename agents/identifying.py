@@ -13,8 +13,6 @@ from shipgym import ShipFile, Trial
 from shipgym.checks import placed
 from shipgym.ships.structures import GREY_BOX
 
-EXTRA_TRIALS = "method.extra_trials"
-
 
 def identification_settings(
     ship: ShipFile, given: Mapping[str, Any], unnamed: str = AUTO
@@ -41,7 +39,7 @@ def identification_settings(
     with_kernel = "kernel" in table or "kernel" in given
     of_file = read_table(table, f"{ship.path}: [identify]", with_kernel)
     # Options that may name a model's file.
-    models = ("reference_model", "prior", "method.anchor")
+    models = ("reference_model", "prior")
     for option in models:
         model = str(of_file.get(option, ""))
         if model.endswith(".json"):
@@ -82,15 +80,9 @@ def trials_of(
     """The trials of a ship file, and the arguments of `identify`.
 
     `settings`: from `identification_settings`. The arguments hold particulars and
-    steering gear of the ship file, and the extra trials read, which are left out of the
-    others.
+    steering gear of the ship file.
     """
-    settings = dict(settings)
-    extra = settings.get(EXTRA_TRIALS, [])
-    trials = [trial for trial in ship.trials() if trial.name not in extra]
-    if extra:
-        settings[EXTRA_TRIALS] = [ship.trial(file) for file in extra]
-
+    trials = list(ship.trials())
     with placed(str(ship.path)):
         arguments = identify_arguments(settings)
     arguments.setdefault("particulars", ship.particulars)
@@ -132,7 +124,7 @@ def compare_ship(
     others = {}
     for name, value in settings.items():
         stage, _, _ = name.partition(".")
-        if stage not in ("method", "accept"):
+        if stage != "method":
             others[name] = value
     trials, arguments = trials_of(ship, others)
     if structures:

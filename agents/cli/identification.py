@@ -26,13 +26,6 @@ def identify_command(
     out: Out,
     *,
     options: dict[str, Any],
-    accept: Annotated[
-        str | None,
-        Option(
-            metavar="TABLE",
-            help="Largest errors on held-out trials: { heading_deg = 3.0, ... }.",
-        ),
-    ] = None,
     compare: Annotated[
         bool,
         Option(
@@ -63,13 +56,8 @@ def identify_command(
     chosen. With --compare, structures and methods are ranked on the held-out trials,
     and comparison and models are written instead.
 
-    Exits with 1 if the identified model is unstable, or errs on a held-out trial by
-    more than --accept allows.
+    Exits with 1 if the identified model is unstable.
     """
-    if accept is not None:
-        from shipgym.files import toml_value
-
-        options["accept"] = toml_value(accept)
     read, settings = _chosen(ship, options)
     if compare or methods is not None or structures is not None:
         _compare(read, settings, out, (structures, methods))
@@ -138,8 +126,6 @@ def _check_stable(result: IdentificationResult) -> None:
             f"the identified model is unstable: {instability}; it must not be used",
             FAILED,
         )
-    if unaccepted := result.metrics.get("unaccepted"):
-        fail(f"the model is not accepted: {'; '.join(unaccepted)}", FAILED)
     notes = [f"{trial.name}: {note}" for trial in result.trials for note in trial.notes]
     for warning in [*notes, *model_warnings(result)]:
         warn(warning)

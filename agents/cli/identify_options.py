@@ -8,7 +8,7 @@ from agents.cli.parameters import with_options
 
 Source = Annotated[
     str | None,
-    Option(help="Source of the covariance: analytic, bootstrap or posterior."),
+    Option(help="Source of the covariance: analytic or posterior."),
 ]
 Settings = Annotated[
     list[str] | None,
@@ -59,13 +59,11 @@ def identify_options(
     ] = None,
     prior: Annotated[
         str | None,
-        Option(
-            help="Pulls the coefficients: a ship, auto, or formulas such as clarke."
-        ),
+        Option(help="Prior of structure mmg: a reference ship, auto or yoshimura."),
     ] = None,
     prior_strength: Annotated[
         float | None,
-        Option(help="Strength of that pull; default: by cross-validation."),
+        Option(help="Strength of that prior; default: by trials held out."),
     ] = None,
     uncertainty: Source = None,
     set_: Settings = None,

@@ -168,9 +168,6 @@ def examined(
     instability = why_unstable(fit)
     if instability is not None:
         return result(instability)
-    unaccepted = fit.metrics.get("unaccepted")
-    if unaccepted:
-        return result(refusal=f"the model is not accepted: {'; '.join(unaccepted)}")
     refusal = why_refused(fit)
     if refusal is not None:
         return result(refusal=refusal)

@@ -141,15 +141,6 @@ def newey_west(scores: Floats, lags: int) -> Floats:
     return total
 
 
-def without_trial(
-    estimators: Estimators,
-    samples: Samples,
-    trial: int,
-) -> tuple[Estimators, Samples]:
-    """Estimators as if fitted without a trial, and the rows of the others."""
-    return without_trials(estimators, samples, [trial])
-
-
 def without_trials(
     estimators: Estimators,
     samples: Samples,

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from identification.estimators.covariance import joint_covariance, without_trial
+from identification.estimators.covariance import joint_covariance, without_trials
 from identification.judging.model_error import (
     DEFAULT,
     FEWEST_TRIALS,
@@ -157,7 +157,7 @@ def _of_companion(problem: Problem) -> RudderBias:
     else:
         left_out = []
         for trial in range(n_trials):
-            without, _ = without_trial(estimators, samples, trial)
+            without, _ = without_trials(estimators, samples, [trial])
             left_out.append(without["r"].coef_)
         covariance = _jackknife(left_out)
     model = with_coefficients(blank, estimators)

@@ -79,18 +79,15 @@ def fit_name(structure: str, method: str) -> str:
     return f"{structure} by {method}"
 
 
-def shown_to_turn(
-    ranked: Sequence[RankedFit], held: Sequence[str] = ()
-) -> list[RankedFit]:
+def shown_to_turn(ranked: Sequence[RankedFit]) -> list[RankedFit]:
     """The fits that are known to turn where no trial does; all where none is.
 
     Those of few parameters, and those that a prior, formulas or a reference ship hold
-    in a hard turn, `held` among them. The terms of a table that zigzags fix are not
-    known beyond them.
+    in a hard turn. The terms of a table that zigzags fix are not known beyond them.
     """
     known = []
     for fit in ranked:
-        turns = fit.structure in (*RESPONSES, GREY_BOX, MMG, *held)
+        turns = fit.structure in (*RESPONSES, GREY_BOX, MMG)
         if turns and not fit.ran_away:
             known.append(fit)
     return known or list(ranked)

@@ -11,10 +11,10 @@ class Uncertainty:
 
     Parameters
     ----------
-    covariance : {"analytic", "bootstrap", "posterior"}
+    covariance : {"analytic", "posterior"}
         From the residuals, taken as correlated between the equations and over the time
-        to sail one ship length; from refits to blocks of that length drawn with
-        replacement; or from a posterior by sampling, draws of which the model keeps.
+        to sail one ship length; or from a posterior by sampling, draws of which the
+        model keeps.
     model_error : bool
         Whether the covariance is scaled until trials left out in turn are predicted
         within it; a posterior always is.
@@ -30,7 +30,7 @@ class Uncertainty:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        kinds = ("analytic", "bootstrap", "posterior")
+        kinds = ("analytic", "posterior")
         check_choice(self.covariance, kinds, "uncertainty")
         check_flag(self.model_error, "model_error")
         check_whole(self.steps, "uncertainty.steps", at_least=20)

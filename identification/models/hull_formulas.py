@@ -6,7 +6,7 @@ Sources: Yoshimura & Masumoto 2012, Hydrodynamic database and manoeuvring predic
 method with medium high-speed merchant ships and fishing vessels, MARSIM (hull, flow
 straightening); Kijima, Katsuno, Nakiri & Furukawa 1990, On the manoeuvring performance
 of a ship with the parameter of loading condition, J. Soc. Naval Architects of Japan 168
-(hull as the alternative, x_H); Zhou, Sheng & Feng 1983 after Motora's charts (added
+(x_H); Zhou, Sheng & Feng 1983 after Motora's charts (added
 mass); Fujii & Tuda 1961 (rudder lift slope); Quadvlieg 2013 (a_H, t_R); Taylor (wake);
 ITTC 1957 and Denny-Mumford (resistance); Wageningen B4-50 (thrust).
 
@@ -15,29 +15,42 @@ rho L^2 d / 2, the moment of inertia by rho L^4 d / 2.
 """
 
 import math
+from typing import NamedTuple
 
-from identification.models.formulas import main_dimensions
 from shipgym import Particulars
-from shipgym.checks import check_choice
 from shipgym.ships.mmg import SHIP
 
 YOSHIMURA = "yoshimura"
-KIJIMA = "kijima"
-HULL_FORMULAS = (YOSHIMURA, KIJIMA)
 
 
-def formula_coefficients(hull: str, ship: Particulars) -> dict[str, float]:
+class MainDimensions(NamedTuple):
+    """Main dimensions of a hull, by the symbols of the formulas."""
+
+    L: float  # length between perpendiculars, m
+    B: float  # beam, m
+    T: float  # draught, m
+    C_b: float  # block coefficient
+
+
+def main_dimensions(ship: Particulars) -> MainDimensions:
+    """Main dimensions of a ship; InputError where one of them is not known."""
+    return MainDimensions(
+        L=ship.length,
+        B=ship.require("beam"),
+        T=ship.require("draught"),
+        C_b=ship.require("block_coefficient"),
+    )
+
+
+def formula_coefficients(ship: Particulars) -> dict[str, float]:
     """Coefficients of the MMG form from main dimensions, without the shaft speed.
 
-    `hull`: "yoshimura" or "kijima"; `ship`: as `mmg_prior.completed` gives it.
+    `ship`: as `mmg_prior.completed` gives it.
     """
-    check_choice(hull, HULL_FORMULAS, "prior")
     masses = added_mass(ship)
     coefficients = dict.fromkeys(SHIP.coefficients, 0.0)
     coefficients |= masses
     coefficients |= yoshimura_hull(ship, masses["mx"], masses["my"])
-    if hull == KIJIMA:
-        coefficients |= kijima_hull(ship, masses["mx"])
     coefficients |= _propeller(ship)
     coefficients |= _rudder(ship)
     coefficients["R_0"] = resistance(ship)
@@ -72,42 +85,6 @@ def yoshimura_hull(ship: Particulars, mx: float, my: float) -> dict[str, float]:
         "N_vvr": 1.55 * slenderness - 0.76,
         "N_vrr": 0.075 * run - 0.098,
         "N_rrr": 0.25 * slenderness - 0.056,
-    }
-
-
-def kijima_hull(ship: Particulars, mx: float) -> dict[str, float]:
-    """Sway and yaw of the hull by Kijima et al. 1990, written there for beta = -v'.
-
-    His squares b |b| and r |r| become the linear and cubic terms of least error over
-    drift angles up to 0.35 and yaw rates up to 0.8.
-    """
-    L, B, d, C_b = main_dimensions(ship)
-    m = _mass(ship)
-    k = 2.0 * d / L
-    slenderness = C_b * B / L
-    fullness = d * C_b / B
-    run = d * (1.0 - C_b) / B
-
-    # x |x| = 5/16 X x + 35/48 / X x^3 up to |x| = X
-    drift, drift_cubed = 5 / 16 * 0.35, 35 / 48 / 0.35
-    turn, turn_cubed = 5 / 16 * 0.8, 35 / 48 / 0.8
-    Y_bb = 2.5 * run + 0.5
-    Y_rr = 0.343 * fullness - 0.07
-    N_bb = 0.066 - 0.96 * run
-    N_rr = 0.5 * slenderness - 0.09
-    return {
-        "Y_v": -(0.5 * math.pi * k + 1.4 * slenderness + drift * Y_bb),
-        "Y_vvv": -drift_cubed * Y_bb,
-        "Y_r": m + mx - 1.5 * slenderness + turn * Y_rr,
-        "Y_rrr": turn_cubed * Y_rr,
-        "Y_vvr": 1.5 * fullness - 0.65,
-        "Y_vrr": -5.95 * run,
-        "N_v": -(k + drift * N_bb),
-        "N_vvv": -drift_cubed * N_bb,
-        "N_r": k * (k - 0.54) + turn * N_rr,
-        "N_rrr": turn_cubed * N_rr,
-        "N_vvr": -(57.5 * slenderness**2 - 18.4 * slenderness + 1.6),
-        "N_vrr": 0.5 * fullness - 0.05,
     }
 
 

@@ -16,7 +16,6 @@ from identification.models.posterior import Estimate, HeldOutError, Posterior
 from identification.models.prior_knowledge import PriorKnowledge
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
-from shipgym.checks import check_number
 from shipgym.ships.mmg import IDENTIFIED
 
 
@@ -89,7 +88,6 @@ def _strengths(asked: PriorKnowledge) -> tuple[float, ...]:
     """Strengths of the prior to choose from, or the one that was given."""
     if asked.strength is None:
         return 1.0, 2.0, 3.0
-    check_number(asked.strength, "prior_strength", above=0.0)
     return (asked.strength,)
 
 

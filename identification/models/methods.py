@@ -65,14 +65,12 @@ class Method:
     make: Callable[[], Estimator]  # makes an unfitted estimator
     #: whether the guard against models that run away may penalise it
     regularised: bool = True
-    #: fits estimators, made by its first argument, to the task that is its second
-    fit: Callable[[Callable[[], Estimator], FitTask], Estimators] = fit_equations
     #: what the fit is the start of
     refinement: Refinement | None = None
 
     def fitted(self, task: FitTask) -> Estimators:
         """Estimators of all equations, fitted."""
-        return self.fit(self.make, task)
+        return fit_equations(self.make, task)
 
 
 def get_method(method: str | Any) -> Method:

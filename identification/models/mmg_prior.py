@@ -6,15 +6,14 @@ Those of a reference ship, or from main dimensions.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from identification.models.formulas import FORMULAS, main_dimensions
 from identification.models.hull_formulas import (
-    HULL_FORMULAS,
-    KIJIMA,
+    YOSHIMURA,
     formula_coefficients,
+    main_dimensions,
 )
 from identification.models.similarity import (
     AUTO,
@@ -32,59 +31,52 @@ from shipgym.ships.mmg import IDENTIFIED, dimensions, standard_form
 from shipgym.ships.particulars import ADDED_MASSES
 from shipgym.ships.structures import MMG
 
-
-class Deviation(NamedTuple):
-    """Standard deviation of a coefficient before any trial, about each kind of mean."""
-
-    reference: float
-    yoshimura: float
-    kijima: float
-
-
-#: With formulas at least the root mean square of what published coefficients of ships
-#: differ by from them (`test_mmg.py`); sources do not agree on the signs in N_vrr.
+#: Standard deviations of the coefficients before any trial, about a reference ship and
+#: about formulas. With formulas at least the root mean square of what published
+#: coefficients of ships differ by from them (`test_mmg.py`); sources do not agree on
+#: the signs in N_vrr.
 DEVIATIONS = {
-    "mx": Deviation(0.005, 0.0062, 0.0062),
-    "my": Deviation(0.03, 0.04, 0.04),
-    "Jz": Deviation(0.002, 0.004, 0.004),
-    "R_0": Deviation(0.006, 0.006, 0.006),
-    "X_vv": Deviation(0.03, 0.06, 0.06),
-    "X_vr": Deviation(0.04, 0.084, 0.084),
-    "X_rr": Deviation(0.02, 0.03, 0.03),
-    "X_vvvv": Deviation(0.4, 0.6, 0.6),
-    "Y_v": Deviation(0.04, 0.08, 0.13),
-    "Y_r": Deviation(0.03, 0.05, 0.05),
-    "Y_vvv": Deviation(0.6, 0.6, 0.6),
-    "Y_vvr": Deviation(0.4, 0.83, 0.83),
-    "Y_vrr": Deviation(0.3, 0.3, 0.3),
-    "Y_rrr": Deviation(0.05, 0.053, 0.053),
-    "N_v": Deviation(0.02, 0.03, 0.03),
-    "N_r": Deviation(0.007, 0.016, 0.016),
-    "N_vvv": Deviation(0.1, 0.16, 0.31),
-    "N_vvr": Deviation(0.1, 0.17, 0.26),
-    "N_vrr": Deviation(0.05, 0.23, 0.23),
-    "N_rrr": Deviation(0.01, 0.03, 0.03),
-    "thrust": Deviation(0.25, 0.25, 0.25),
-    "w_P0": Deviation(0.1, 0.1, 0.1),
-    "C_1": Deviation(0.5, 0.5, 0.5),
-    "C_2": Deviation(0.25, 0.25, 0.25),
-    "C_2_side": Deviation(0.25, 0.25, 0.25),
-    "t_R": Deviation(0.05, 0.1, 0.1),
-    "a_H": Deviation(0.1, 0.12, 0.12),
-    "x_H": Deviation(0.05, 0.05, 0.05),
-    "l_R": Deviation(0.1, 0.2, 0.2),
-    "gamma_R": Deviation(0.12, 0.15, 0.15),
-    "gamma_R_side": Deviation(0.12, 0.12, 0.12),
-    "epsilon": Deviation(0.2, 0.2, 0.2),
-    "kappa": Deviation(0.12, 0.12, 0.12),
-    "f_alpha": Deviation(0.2, 0.47, 0.47),
-    "delta_0": Deviation(math.radians(1.0), math.radians(1.0), math.radians(1.0)),
-    "Y_0": Deviation(0.001, 0.001, 0.001),
-    "N_0": Deviation(0.0005, 0.0005, 0.0005),
-    "c_R": Deviation(0.5, 0.5, 0.5),
-    "speed_power": Deviation(0.5, 0.5, 0.5),
-    "N_absr": Deviation(0.003, 0.003, 0.003),
-    "N_rr": Deviation(0.008, 0.008, 0.008),
+    "mx": (0.005, 0.0062),
+    "my": (0.03, 0.04),
+    "Jz": (0.002, 0.004),
+    "R_0": (0.006, 0.006),
+    "X_vv": (0.03, 0.06),
+    "X_vr": (0.04, 0.084),
+    "X_rr": (0.02, 0.03),
+    "X_vvvv": (0.4, 0.6),
+    "Y_v": (0.04, 0.08),
+    "Y_r": (0.03, 0.05),
+    "Y_vvv": (0.6, 0.6),
+    "Y_vvr": (0.4, 0.83),
+    "Y_vrr": (0.3, 0.3),
+    "Y_rrr": (0.05, 0.053),
+    "N_v": (0.02, 0.03),
+    "N_r": (0.007, 0.016),
+    "N_vvv": (0.1, 0.16),
+    "N_vvr": (0.1, 0.17),
+    "N_vrr": (0.05, 0.23),
+    "N_rrr": (0.01, 0.03),
+    "thrust": (0.25, 0.25),
+    "w_P0": (0.1, 0.1),
+    "C_1": (0.5, 0.5),
+    "C_2": (0.25, 0.25),
+    "C_2_side": (0.25, 0.25),
+    "t_R": (0.05, 0.1),
+    "a_H": (0.1, 0.12),
+    "x_H": (0.05, 0.05),
+    "l_R": (0.1, 0.2),
+    "gamma_R": (0.12, 0.15),
+    "gamma_R_side": (0.12, 0.12),
+    "epsilon": (0.2, 0.2),
+    "kappa": (0.12, 0.12),
+    "f_alpha": (0.2, 0.47),
+    "delta_0": (math.radians(1.0), math.radians(1.0)),
+    "Y_0": (0.001, 0.001),
+    "N_0": (0.0005, 0.0005),
+    "c_R": (0.5, 0.5),
+    "speed_power": (0.5, 0.5),
+    "N_absr": (0.003, 0.003),
+    "N_rr": (0.008, 0.008),
 }
 
 
@@ -104,19 +96,14 @@ class MMGPrior:
 def mmg_prior(source: str | ShipModel, particulars: Particulars) -> MMGPrior:
     """The prior of a reference ship in the MMG form, or of formulas.
 
-    `source`: a reference ship, "auto" for the one most like this ship, or "yoshimura"
-    or "kijima"; `particulars`: with service speed; beam, draught, block coefficient and
+    `source`: a reference ship, "auto" for the one most like this ship, or
+    "yoshimura"; `particulars`: with service speed; beam, draught, block coefficient and
     what of rudder and propeller is known. Raises InputError for a reference ship of
     other equations or unlike this one, and particulars that do not suffice.
     """
     ship = completed(particulars)
-    if isinstance(source, str) and source in HULL_FORMULAS:
-        prior = _formula_prior(source, ship)
-    elif isinstance(source, str) and source in FORMULAS:
-        raise InputError(
-            f"prior: expected {quoted(HULL_FORMULAS)} or a reference ship with"
-            f" structure 'mmg', got {source!r}"
-        )
+    if isinstance(source, str) and source == YOSHIMURA:
+        prior = _formula_prior(ship)
     else:
         prior = _reference_prior(source, ship)
 
@@ -159,16 +146,12 @@ def completed(particulars: Particulars) -> Particulars:
     return replace(ship, **absent, estimated=estimated)
 
 
-def _formula_prior(hull: str, ship: Particulars) -> MMGPrior:
-    deviations = []
-    for name in IDENTIFIED:
-        row = DEVIATIONS[name]
-        deviations.append(row.kijima if hull == KIJIMA else row.yoshimura)
+def _formula_prior(ship: Particulars) -> MMGPrior:
     return MMGPrior(
-        source=hull,
+        source=YOSHIMURA,
         ship=ship,
-        mean=formula_coefficients(hull, ship),
-        deviation=np.array(deviations),
+        mean=formula_coefficients(ship),
+        deviation=np.array([DEVIATIONS[name][1] for name in IDENTIFIED]),
         remarks=_out_of_range(ship),
     )
 
@@ -182,7 +165,7 @@ def _reference_prior(source: str | ShipModel, ship: Particulars) -> MMGPrior:
             f"reference ship {model.name!r} is not like this one: similarity"
             f" {like:.2f}; compare with prior = 'yoshimura'",
         )
-    deviations = [DEVIATIONS[name].reference for name in IDENTIFIED]
+    deviations = [DEVIATIONS[name][0] for name in IDENTIFIED]
     return MMGPrior(
         source=model.name,
         ship=ship,

@@ -39,28 +39,21 @@ class OutputError:
     """A fit by the errors of simulated segments: what is compared, and from where."""
 
     shooter: Shooter
-    fitted: Sequence[Segment]  # of the trials to fit
-    further: Sequence[Segment]  # of further trials, which have no part in the scatter
+    segments: Sequence[Segment]  # of the trials
     start: Floats  # parameters to begin with, toward which the coefficients are pulled
     staggered: bool  # whether a second set of segments has each sample once more
 
     @property
-    def n_rows(self) -> int:
-        """Residuals of the trials to fit, which come first."""
-        blocks = sum(len(segment.blocks) for segment in self.fitted)
-        return len(self.shooter.channels) * blocks
-
-    @property
     def n_samples(self) -> int:
-        """Samples of the trials to fit."""
-        return sum(len(segment.measured) for segment in self.fitted)
+        """Samples of all segments."""
+        return sum(len(segment.measured) for segment in self.segments)
 
     @property
     def bin_width(self) -> float:
         """Bins of time in which residuals are added up, s: blocks or sampling steps."""
         travel_time = self.shooter.model.travel_time
         width = float(BLOCK * travel_time)
-        for segment in self.fitted:
+        for segment in self.segments:
             if len(segment.times) > 1:
                 step = usual_step(segment.times)
                 width = max(width, step)
@@ -69,17 +62,15 @@ class OutputError:
     def start_scales(self) -> Floats:
         """Scales of the residuals at the start; not finite where a ship runs away."""
         shooter = self.shooter
-        segments = [*self.fitted, *self.further]
-        shooting = shooter.shoot(self.start, segments, shooter.units)
+        shooting = shooter.shoot(self.start, self.segments, shooter.units)
         return self.scales(shooting, shooter.units)
 
     def scales(self, shooting: Shooting, scales: Floats) -> Floats:
-        """Root mean square of the residuals by channel, per sample of trials to fit.
+        """Root mean square of the residuals by channel, per sample.
 
         `scales`: those in which the residuals are given.
         """
-        fitted = shooting.residuals[: self.n_rows]
-        by_channel = fitted.reshape(-1, len(scales))
+        by_channel = shooting.residuals.reshape(-1, len(scales))
         errors = by_channel * scales
         squares = np.sum(errors**2, axis=0)
         # a residual is a mean over a block, times the root of its samples
@@ -87,19 +78,13 @@ class OutputError:
         smallest = 1e-9 * self.shooter.units
         return np.asarray(np.maximum(rms, smallest))
 
-    def pull_weights(self, pull: float) -> Floats:
-        """Weight of each parameter's distance from the start, shape (n_parameters,).
+    def pull_weight(self, pull: float) -> float:
+        """Weight of each parameter's distance from the start.
 
         `pull`: cost of a coefficient by that of all samples being off by their scales.
-        The zero of a rudder is known to a degree.
         """
-        n_compared = sum(segment.measured.size for segment in self.fitted)
-        n_terms = len(self.shooter.term_sizes)
-        one_degree = np.radians(1.0)
-        weights = np.empty(len(self.start))
-        weights[:n_terms] = np.sqrt(pull * n_compared)
-        weights[n_terms:] = 1.0 / one_degree
-        return weights
+        n_compared = sum(segment.measured.size for segment in self.segments)
+        return float(np.sqrt(pull * n_compared))
 
     def solve(self, scales: Floats, pull: float, rounds: int) -> Solution:
         """Fit, renew scales and starts of the segments, and fit again.
@@ -107,13 +92,13 @@ class OutputError:
         `scales`: to begin with; `rounds`: of fits, between which scales of the
         residuals and starts of the segments are renewed.
         """
-        weights = self.pull_weights(pull)
+        weight = self.pull_weight(pull)
         parameters = self.start
-        segments = [*self.fitted, *self.further]
+        segments = self.segments
         evaluations = 0
         for _ in range(rounds):
             last_scales, last_segments = scales, segments
-            fit = self._fit(parameters, segments, scales, weights)
+            fit = self._fit(parameters, segments, scales, weight)
             parameters = fit.x
             evaluations += fit.nfev
             shooting = self.shooter.shoot(parameters, segments, scales)
@@ -136,16 +121,16 @@ class OutputError:
         start: Floats,
         segments: Sequence[Segment],
         scales: Floats,
-        weights: Floats,
+        weight: float,
     ) -> Any:
         """Parameters of least cost between two renewals of scales and starts."""
 
         def linearised(parameters: Floats) -> Linearised:
             shooting = self.shooter.shoot(parameters, segments, scales)
-            pulled = weights * (parameters - self.start)
+            pulled = weight * (parameters - self.start)
             return Linearised(
                 residuals=np.concatenate([shooting.residuals, pulled]),
-                jacobian=np.vstack([shooting.jacobian, np.diag(weights)]),
+                jacobian=np.vstack([shooting.jacobian, weight * np.eye(len(pulled))]),
             )
 
         return fit_least_squares(
@@ -158,8 +143,7 @@ class OutputError:
         )
 
     def _mean_square(self, shooting: Shooting) -> float:
-        fitted = shooting.residuals[: self.n_rows]
-        return float(np.mean(fitted**2))
+        return float(np.mean(shooting.residuals**2))
 
     def covariance(
         self, solution: Solution, memory: float
@@ -167,26 +151,25 @@ class OutputError:
         """Sandwich covariance of the coefficients of the accelerations, and influences.
 
         Scores are added up over the samples of the same time, which the staggered set
-        has twice, and over time as by Newey & West 1987. Further trials and the pull
-        count as known. The influences, by trial, are what each bin of time added to the
+        has twice, and over time as by Newey & West 1987. The pull counts as known. The
+        influences, by trial, are what each bin of time added to the
         coefficients, shape (n_bins, n_coefficients).
         """
         inverse = self._inverse_information(solution)
         scores = self._scores(solution.shooting)
         factor = self._freedom_factor(solution.shooting, inverse)
         sizes = self.shooter.term_sizes
-        terms = slice(len(sizes))
 
         influences = []
         for trial_scores in scores:
             moves = trial_scores @ inverse
-            influence = -np.sqrt(factor) * moves[:, terms] * sizes
+            influence = -np.sqrt(factor) * moves * sizes
             influences.append(influence)
 
         moment = self._score_moment(scores, memory)
         of_parameters = factor * inverse @ moment @ inverse
         units = np.outer(sizes, sizes)
-        covariance = of_parameters[terms, terms] * units
+        covariance = of_parameters * units
         return 0.5 * (covariance + covariance.T), influences
 
     def _score_moment(self, scores: Sequence[Floats], memory: float) -> Floats:
@@ -200,10 +183,9 @@ class OutputError:
 
     def _inverse_information(self, solution: Solution) -> Floats:
         """Inverse of the information of the samples and the pull."""
-        weights = self.pull_weights(solution.pull)
         jacobian = solution.shooting.jacobian
         of_samples = jacobian.T @ jacobian
-        of_pull = np.diag(weights**2)
+        of_pull = self.pull_weight(solution.pull) ** 2 * np.eye(len(self.start))
         inverse = np.linalg.pinv(
             of_samples + of_pull,
             rcond=1e-14,
@@ -216,31 +198,26 @@ class OutputError:
 
         Shape (n_bins, n_parameters).
         """
-        fitted = slice(self.n_rows)
-        residuals = shooting.residuals[fitted]
-        jacobian = shooting.jacobian[fitted]
-        rows = jacobian * residuals[:, None]
+        rows = shooting.jacobian * shooting.residuals[:, None]
 
         # the channels of a block stand together
         n_channels = len(self.shooter.channels)
         n_parameters = rows.shape[1]
         blocks = rows.reshape(-1, n_channels, n_parameters)
         scores = blocks.sum(axis=1)
-        return in_bins(scores, self.fitted, self.bin_width)
+        return in_bins(scores, self.segments, self.bin_width)
 
     def _freedom_factor(self, shooting: Shooting, inverse: Floats) -> float:
         """Samples by samples less the parameters and starts fitted to them."""
         repeats = 2.0 if self.staggered else 1.0
-        n_samples = self.n_rows / repeats
+        n_samples = len(shooting.residuals) / repeats
 
         # parameters count by their leverage, as the pull gives some of them
-        jacobian = shooting.jacobian[: self.n_rows]
+        jacobian = shooting.jacobian
         leverage = (jacobian @ inverse) * jacobian
         parameters = float(leverage.sum())
 
-        n_segments = len(self.fitted)
-        moves = shooting.moves[:n_segments]
-        starts = sum(len(move) for move in moves) / repeats
+        starts = sum(len(move) for move in shooting.moves) / repeats
         left = n_samples - parameters - starts
         return n_samples / max(left, 1.0)
 

@@ -27,7 +27,6 @@ from identification.models.shooting import (
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Flags, Floats, Integers
 from shipgym.engine.motion import Ship
-from shipgym.engine.records import LANES
 from shipgym.ships.mmg import IDENTIFIED
 
 LARGEST = 1e3  # residual of a ship that runs away, in scales
@@ -162,7 +161,6 @@ class Posterior:
             segment,
             ships=ships,
             starts=in_all_lanes(segment.start),
-            offsets=np.zeros(LANES),
         )
         # at the first sample the ships have not moved yet
         simulated = states[1:, columns, :used]

@@ -1,7 +1,6 @@
 """Refinement: a model fitted to what it simulates, from where a method left off."""
 
 import copy
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,12 +10,11 @@ from identification.arrays import by_name, column_rms, root_mean_square
 from identification.estimators.estimator import Estimators, FitTask
 from identification.models.guard import GuardedFit, reasons_unstable
 from identification.models.output_error import OutputError, Solution
-from identification.models.prior import reference_turns
 from identification.models.refinement import Refinement
-from identification.models.segments import Segment, compared_channels, cut
+from identification.models.segments import compared_channels, cut
 from identification.models.shooting import Shooter
 from identification.samples.samples import Samples
-from shipgym import InputError, ShipModel, Trial
+from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
 
 
@@ -28,12 +26,11 @@ class Refined:
     #: of the coefficients of the accelerations; None where the start stayed, shape
     #: (n_coefficients, n_coefficients)
     covariance: Floats | None
-    #: by trial: by how much stretches of time moved those coefficients, for the
-    #: bootstrap, shape (n_stretches, n_coefficients)
+    #: by trial: by how much stretches of time moved those coefficients, shape
+    #: (n_stretches, n_coefficients)
     influences: list[Floats]
     #: for the provenance: settings, cost before and after, scales, offsets, decision
     report: dict[str, Any]
-    width: float = 0.0  # of the stretches, s
 
 
 def refine(
@@ -51,9 +48,8 @@ def refine(
     segments are renewed, of which one does from near the end. A refined model that runs
     away is pulled ten times harder to the start, up to three times. Returns the start
     itself where its model runs away already, or the refined ones do however hard they
-    are pulled. Raises InputError for extra trials that lack channels.
+    are pulled.
     """
-    _check_refinable(start.model, settings.extra_trials)
     problem = _posed(start, task, settings)
     scales = problem.start_scales()
     simulated = np.isfinite(scales).all()
@@ -68,7 +64,7 @@ def refine(
         model = _model(start.model, problem, solution.parameters)
         reasons = reasons_unstable(model, task.trials)
         if not reasons:
-            report = settings.plain() | _report(problem, solution, task.trials)
+            report = settings.plain() | _report(problem, solution)
             if rejected:
                 report["rejected"] = rejected
             return _refined(
@@ -100,7 +96,6 @@ def _refined(
         covariance=covariance,
         influences=influences,
         report=report,
-        width=problem.bin_width,
     )
 
 
@@ -114,85 +109,31 @@ def _kept(start: GuardedFit, settings: Refinement, report: dict[str, Any]) -> Re
     )
 
 
-def _check_refinable(blank: ShipModel, extra_trials: Sequence[Trial]) -> None:
-    """Refuse a state that is not recorded, and extra trials that lack channels."""
+def _posed(start: GuardedFit, task: FitTask, settings: Refinement) -> OutputError:
+    """The problem: segments of the trials, and coefficients in units of their terms."""
+    blank = start.model
     if "q" in blank.table.equations:
         raise InputError(
             "method 'output-error': expected a structure without a memory of yaw,"
             f" whose state no trial records, got {blank.structure!r}; choose method"
             " 'tls-svm'"
         )
-    needed = blank.table.required_channels
-    for trial in extra_trials:
-        missing = [channel for channel in needed if channel not in trial]
-        if missing:
-            raise InputError(
-                f"extra trial {trial.name!r}: channel {missing[0]!r} is missing,"
-                f" expected {', '.join(needed)}"
-            )
-
-
-def _posed(start: GuardedFit, task: FitTask, settings: Refinement) -> OutputError:
-    """The problem: segments of the trials, of extra ones and of an anchor's turns."""
-    blank = start.model
-    channels = compared_channels(blank, [*task.trials, *settings.extra_trials])
+    channels = compared_channels(blank, task.trials)
     equations = blank.table.equations
     sizes = np.concatenate([term_sizes(task.samples, q) for q in equations])
-    n_trials = len(task.trials)
-    n_offsets = n_trials if settings.rudder_offsets else 0
+    values = np.concatenate([start.estimators[q].coef_ for q in equations])
     return OutputError(
-        shooter=Shooter(
+        shooter=Shooter(blank, channels, sizes),
+        segments=cut(
+            task.trials,
             blank,
             channels,
-            term_sizes=sizes,
-            free=settings.segment_start == "free",
+            settings.segment_lengths,
+            settings.staggered,
         ),
-        fitted=_segments(task.trials, blank, channels, settings),
-        further=_further(blank, channels, settings, n_trials),
-        start=_start_parameters(start, sizes, n_offsets),
+        start=values / sizes,
         staggered=settings.staggered,
     )
-
-
-def _start_parameters(start: GuardedFit, sizes: Floats, n_offsets: int) -> Floats:
-    """Coefficients of a fit by their sizes, then offsets of 0."""
-    equations = start.model.table.equations
-    values = np.concatenate([start.estimators[q].coef_ for q in equations])
-    offsets = np.zeros(n_offsets)
-    return np.concatenate([values / sizes, offsets])
-
-
-def _segments(
-    trials: Sequence[Trial],
-    blank: ShipModel,
-    channels: Sequence[str],
-    settings: Refinement,
-) -> list[Segment]:
-    length = settings.segment_lengths
-    return cut(trials, blank, channels, length, settings.staggered)
-
-
-def _further(
-    blank: ShipModel, channels: Sequence[str], settings: Refinement, n_fitted: int
-) -> list[Segment]:
-    """Weighted segments of extra trials and an anchor's turns."""
-    extra = list(settings.extra_trials)
-    weights = [settings.extra_weight] * len(extra)
-    if settings.anchor is not None:
-        turns = reference_turns(settings.anchor, blank)
-        extra += turns
-        weights += [settings.anchor_weight] * len(turns)
-
-    further = []
-    for segment in _segments(extra, blank, channels, settings):
-        index = segment.trial
-        weighted = replace(
-            segment,
-            trial=n_fitted + index,
-            weight=weights[index],
-        )
-        further.append(weighted)
-    return further
 
 
 def term_sizes(samples: Samples, equation: str) -> Floats:
@@ -210,7 +151,7 @@ def term_sizes(samples: Samples, equation: str) -> Floats:
 
 
 def _model(blank: ShipModel, problem: OutputError, parameters: Floats) -> ShipModel:
-    accelerations, _ = problem.shooter.split(parameters)
+    accelerations = parameters * problem.shooter.term_sizes
     values = np.linalg.solve(blank.acceleration_matrix, accelerations)
     return blank.with_coefficients(np.asarray(values, dtype=float))
 
@@ -219,7 +160,7 @@ def _estimators(
     start: GuardedFit, problem: OutputError, parameters: Floats
 ) -> Estimators:
     """The start's estimators with the refined coefficients, for the diagnostics."""
-    coefficients, _ = problem.shooter.split(parameters)
+    coefficients = parameters * problem.shooter.term_sizes
     estimators = {}
     for q, rows in start.model.table.regression_rows.items():
         refined = copy.copy(start.estimators[q])
@@ -228,20 +169,14 @@ def _estimators(
     return estimators
 
 
-def _report(
-    problem: OutputError, solution: Solution, trials: Sequence[Trial]
-) -> dict[str, Any]:
+def _report(problem: OutputError, solution: Solution) -> dict[str, Any]:
     """For the provenance."""
-    shooter = problem.shooter
-    _, offsets = shooter.split(solution.parameters)
-    names = [trial.name for trial in trials[: len(offsets)]]
     return {
-        "segments": len(problem.fitted),
+        "segments": len(problem.segments),
         "cost_before": solution.cost_before,
         "cost_after": solution.cost_after,
         "evaluations": solution.evaluations,
-        "residual_rms": by_name(shooter.channels, solution.scales),
-        "rudder_offsets_deg": by_name(names, np.degrees(offsets)),
+        "residual_rms": by_name(problem.shooter.channels, solution.scales),
         "pull": solution.pull,
         "decision": "refined",
     }

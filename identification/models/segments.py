@@ -35,7 +35,6 @@ class Segment:
     #: state at the first sample, in the order of the model's `state_names`, shape
     #: (n_state,)
     start: Floats
-    weight: float = 1.0  # of its squared residuals
 
     @property
     def duration(self) -> float:

@@ -94,7 +94,6 @@ class WholeTrials:
             part,
             ships=np.hstack([ships, spare]),
             starts=starts,
-            offsets=np.zeros(LANES),
         )
         # at the first sample the ships have not moved yet
         simulated = states[1:, self.columns, :n_ships]

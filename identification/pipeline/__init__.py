@@ -5,7 +5,6 @@ from typing import Any
 
 from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.threads import single_threaded
-from identification.judging.acceptance import unaccepted
 from identification.judging.uncertainty import Uncertainty
 from identification.models.prior_knowledge import PriorKnowledge
 from identification.pipeline.by_regression import by_regression
@@ -38,7 +37,6 @@ def identify(
     rudder_bias: str = "auto",
     hold_out: str | Sequence[str] = (),
     guarded: bool = True,
-    accept: Mapping[str, float] | None = None,
     name: str | None = None,
     service_shaft_speed: float | None = None,
 ) -> IdentificationResult:
@@ -57,8 +55,7 @@ def identify(
     Returns
     -------
     IdentificationResult
-        Its `metrics` have why the model is not accepted as `unaccepted`, where `accept`
-        sets limits; empty for a model that is.
+        The model, how well it predicts the trials, and how it came about.
 
     Raises
     ------
@@ -82,7 +79,6 @@ def identify(
         rudder_bias=rudder_bias,
         hold_out=hold_out,
         guarded=guarded,
-        accept=accept,
         name=name,
         service_shaft_speed=service_shaft_speed,
     )
@@ -94,6 +90,4 @@ def identify(
 
         announce(f"identifying {len(trials)} trials, some seconds")
         result = identified(trials, options)
-    if options.accept is not None:
-        result.metrics["unaccepted"] = unaccepted(result, options.accept)
     return result

@@ -23,7 +23,7 @@ from identification.pipeline.evaluation import (
     provenance_of,
     with_uncertainty,
 )
-from identification.pipeline.options import Options, name_of
+from identification.pipeline.options import Options
 from identification.pipeline.pose import pose
 from identification.pipeline.result import IdentificationResult
 from identification.samples.prediction import is_yaw_alone
@@ -98,11 +98,10 @@ class RegressionFit:
         """
         problem = replace(self.problem, sea={**self.problem.sea, **(sea or {})})
         provenance = provenance_of(options, self.method.name, self.fit, problem)
-        provenance |= _prior_report(options, self.fit)
         if self.refined is not None:
             provenance["refinement"] = self.refined.report
-        if options.uncertainty.covariance != "analytic":
-            provenance["uncertainty"] = options.uncertainty.covariance
+        if options.uncertainty.by_sampling:
+            provenance["uncertainty"] = "posterior"
         return with_uncertainty(
             self.fit,
             self.refined,
@@ -166,7 +165,7 @@ def differentiates_heading(trials: Sequence[Trial], options: Options) -> bool:
     if isinstance(table, str) and table in list_structures():
         table = get_structure(table)
     is_response = isinstance(table, Structure) and set(table.equations) == {"r"}
-    if not is_response or options.prior is not None:
+    if not is_response:
         return False
     derived = []
     for trial in held_out(trials, options.hold_out):
@@ -204,23 +203,12 @@ def fit_regression(trials: Sequence[Trial], options: Options) -> RegressionFit:
     """The fit of `by_regression`, before its uncertainty and predictions."""
     problem = pose(trials, options)
     task = FitTask(problem.samples, problem.blank, problem.used)
-    method = _asked_method(options, task.blank)
+    method = get_method(options.method)
     fit = guarded_fit(method, task, options.guarded)
     refined = _refined(fit, task, method)
     if refined is not None:
         fit = refined.fit
     return RegressionFit(problem, task, method, fit, refined)
-
-
-def _asked_method(options: Options, blank: ShipModel) -> Method:
-    """The method of the options, pulled toward their prior if there is one."""
-    method = get_method(options.method)
-    if options.prior is None:
-        return method
-
-    from identification.models.pulled import with_prior
-
-    return with_prior(method, options.prior, blank)
 
 
 def _refined(
@@ -234,14 +222,3 @@ def _refined(
 
     memory = MEMORY * task.blank.travel_time
     return refine(fit, task, method.refinement, memory, rounds)
-
-
-def _prior_report(options: Options, fit: GuardedFit) -> dict[str, Any]:
-    """Name and strength of a prior; every estimator has the same report."""
-    if options.prior is None:
-        return {}
-    report: dict[str, Any] = {"prior": name_of(options.prior.source)}
-    for estimator in fit.estimators.values():
-        report |= getattr(estimator, "prior_", {})
-        break
-    return report

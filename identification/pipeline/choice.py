@@ -91,9 +91,8 @@ def select(
     best = simplest(ranked, windy)
     turns: dict[str, Any] = {"shown_by": "a trial that turns"}
     if not holds_turn(to_fit):
-        held = () if options.prior is None else TABLES
         by_error = best
-        best = simplest(shown_to_turn(ranked, held), windy)
+        best = simplest(shown_to_turn(ranked), windy)
         turns = what_turns(best, by_error)
     others = [other for other in ranked if other is not best]
     report = {
@@ -183,6 +182,7 @@ class _Attempts:
             structure=structure,
             method=method,
             reference_model=reference,
+            prior=self.options.prior if structure == MMG else None,
         )
         if structure in (GREY_BOX, MMG) and own.particulars is not None:
             own = replace(own, particulars=_of_usual_hull(own.particulars))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,11 +12,7 @@ import shipgym
 from identification.estimators.covariance import (
     coefficient_covariance,
     joint_covariance,
-    without_trial,
-)
-from identification.judging.bootstrap import (
-    bootstrap_covariance,
-    influence_covariance,
+    without_trials,
 )
 from identification.judging.diagnostics import diagnose
 from identification.judging.extrapolation import Without, beyond_trials
@@ -159,16 +155,14 @@ def scaled_covariance(
     fit: GuardedFit,
     refined: Refined | None,
     problem: Problem,
-    without: Callable[[Sequence[int]], ShipModel] | None = None,
+    without: Without | None = None,
 ) -> tuple[Floats, dict[str, Any]]:
     """Covariance of the coefficients, scaled by the model error, and a report on it."""
-    covariance = unscaled_covariance(
-        asked.covariance,
-        fit,
-        refined,
-        problem.samples,
-        problem.blank,
-    )
+    if refined is None or refined.covariance is None:
+        covariance = _of_regression(fit, problem.samples, problem.blank)
+    else:
+        matrix = problem.blank.acceleration_matrix
+        covariance = coefficient_covariance(refined.covariance, matrix)
     if not asked.model_error:
         return covariance, {}
     own = replace(fit.model, covariance=covariance)
@@ -178,28 +172,13 @@ def scaled_covariance(
     return factor**2 * covariance, error
 
 
-def unscaled_covariance(
-    kind: str,
-    fit: GuardedFit,
-    refined: Refined | None,
-    samples: Samples,
-    blank: ShipModel,
-) -> Floats:
-    """Covariance of the coefficients.
+def _of_regression(fit: GuardedFit, samples: Samples, blank: ShipModel) -> Floats:
+    """Covariance of the coefficients by the residuals of a regression.
 
     Errors are correlated over the time to sail one ship length.
     """
     memory = MEMORY * blank.travel_time
-    if refined is None or refined.covariance is None:
-        if kind == "bootstrap":
-            covariance = bootstrap_covariance(fit.estimators, samples, memory)
-        else:
-            covariance = joint_covariance(fit.estimators, samples, memory)
-    elif kind == "bootstrap":
-        block = max(round(memory / refined.width), 1)
-        covariance = influence_covariance(refined.influences, block)
-    else:
-        covariance = refined.covariance
+    covariance = joint_covariance(fit.estimators, samples, memory)
     return coefficient_covariance(covariance, blank.acceleration_matrix)
 
 
@@ -208,34 +187,27 @@ def left_out_models(
     problem: Problem,
     refined: Refined | None,
     covariance: Floats,
-    without: Callable[[Sequence[int]], ShipModel] | None = None,
+    without: Without | None = None,
 ) -> list[ShipModel]:
-    """The models, with covariance, of fits without each of the trials."""
+    """The models, with covariance, of fits without each of the trials.
+
+    A refined model is fitted again where `without` says how, else less what each trial
+    moved its coefficients by.
+    """
     n_trials = len(problem.used)
     if n_trials < FEWEST_TRIALS:
         return []
     if refined is None or refined.covariance is None:
         return [_without(trial, fit, problem) for trial in range(n_trials)]
 
-    if without is not None:
-        inflation = n_trials / (n_trials - 1)
-        return [
-            replace(without([trial]), covariance=inflation * covariance)
-            for trial in range(n_trials)
-        ]
-    full = replace(fit.model, covariance=covariance)
-    return _less_influences(full, refined.influences)
-
-
-def _less_influences(model: ShipModel, influences: Sequence[Floats]) -> list[ShipModel]:
-    """The refined model less what each trial moved its coefficients by."""
-    n_trials = len(influences)
     inflation = n_trials / (n_trials - 1)
-    covariance = inflation * np.asarray(model.covariance)
     found = []
     for trial in range(n_trials):
-        less = less_influence(model, influences, trial)
-        found.append(replace(less, covariance=covariance))
+        if without is not None:
+            model = without([trial])
+        else:
+            model = less_influence(fit.model, refined.influences, trial)
+        found.append(replace(model, covariance=inflation * covariance))
     return found
 
 
@@ -256,16 +228,10 @@ def less_influence(
 
 def _without(trial: int, fit: GuardedFit, problem: Problem) -> ShipModel:
     """The model, with covariance, of a regression without one of its trials."""
-    estimators, rows = without_trial(fit.estimators, problem.samples, trial)
-    covariance = unscaled_covariance(
-        "analytic",
-        replace(fit, estimators=estimators),
-        None,
-        rows,
-        problem.blank,
-    )
+    estimators, rows = without_trials(fit.estimators, problem.samples, [trial])
+    others = replace(fit, estimators=estimators)
     model = with_coefficients(fit.model, estimators)
-    return replace(model, covariance=covariance)
+    return replace(model, covariance=_of_regression(others, rows, problem.blank))
 
 
 def evaluated(

@@ -9,7 +9,6 @@ import numpy as np
 import shipgym
 from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.linear import LinearRegressor
-from identification.judging.acceptance import check_accept
 from identification.judging.uncertainty import Uncertainty
 from identification.models.methods import METHODS, make_method
 from identification.models.prior_knowledge import PriorKnowledge
@@ -62,7 +61,7 @@ class Options:
     kernel : str, KernelResidual or None
         Kernel of an LS-SVM on what a reference ship leaves.
     prior : str, ShipModel, PriorKnowledge or None
-        What the coefficients are pulled toward.
+        What the coefficients of `mmg` are pulled toward.
     uncertainty : str or Uncertainty
         Where the covariance of the coefficients comes from.
     current : str or table
@@ -86,11 +85,6 @@ class Options:
     guarded : bool
         Whether a model that runs away in a hard turn is fitted again, with the weakest
         sufficient penalty on terms that are large there and invisible in the data.
-    accept : table or None
-        Largest errors on held-out trials with which the model is accepted, such as
-        `{ heading_deg = 3.0, overshoot_deg = 2.0 }`: root mean square of the heading,
-        and of the indices overshoot_deg, advance_lengths, transfer_lengths and
-        tactical_diameter_lengths.
     name : str or None
         Of the model; by default that of the ship.
     service_shaft_speed : float or None, above 0
@@ -112,7 +106,6 @@ class Options:
     rudder_bias: str = "auto"
     hold_out: str | Sequence[str] = ()
     guarded: bool = True
-    accept: Mapping[str, float] | None = None
     name: str | None = None
     service_shaft_speed: float | None = None
 
@@ -129,23 +122,18 @@ class Options:
         check_current(self.current)
         check_wind(self.wind)
         check_choice(self.rudder_bias, ("auto", "none"), "rudder_bias")
-        if self.prior is not None and self.prior.source is None:
-            self._check_prior_is_implied()
+        if self.prior is not None and self.structure not in (MMG, AUTO):
+            raise InputError(
+                "prior: expected none but with structure 'mmg', whose coefficients it"
+                f" holds, got structure {name_of(self.structure)!r}; leave the prior"
+                " out, or choose 'mmg' or 'auto'"
+            )
         check_flag(self.guarded, "guarded")
-        if self.accept is not None:
-            check_accept(self.accept)
         if self.name is not None:
             check_text(self.name, "name")
         speed = self.service_shaft_speed
         if speed is not None:
             check_number(speed, "service_shaft_speed", above=0.0, hint="1/s")
-
-    def _check_prior_is_implied(self) -> None:
-        if self.structure != MMG:
-            raise InputError(
-                "prior: expected a reference ship or formulas to pull the coefficients"
-                " toward, got none; name one, or leave its strength and folds out"
-            )
 
     @property
     def method_is_default(self) -> bool:

@@ -146,8 +146,7 @@ def check_value(name: str, value: Any, method: Any = None) -> None:
     The message is that of the `method` named.
     """
     # Settings that are lists of names.
-    lists = ("hold_out", "method.extra_trials")
-    if name in lists:
+    if name == "hold_out":
         _check_names(value, name.rpartition(".")[2])
         return
 

@@ -106,8 +106,8 @@ def by_kernel(
     """A reference ship, fitted or named, and a kernel on what she leaves."""
     if options.uncertainty.by_sampling:
         raise InputError(
-            "uncertainty: expected 'analytic' or 'bootstrap' with a kernel, got"
-            " 'posterior'; choose one of these, or leave the kernel out"
+            "uncertainty: expected 'analytic' with a kernel, got 'posterior'; leave"
+            " one of them out"
         )
     beneath = reference_options(options)
     problem = pose(trials, beneath)
@@ -279,12 +279,6 @@ def checked_mmg(options: Options) -> Options:
             f" {name_of(options.method)!r}; it is not linear in its coefficients and is"
             " fitted by simulation error with a prior: leave the method and its"
             " settings out, or choose another structure"
-        )
-    covariance = options.uncertainty.covariance
-    if covariance == "bootstrap":
-        raise InputError(
-            "uncertainty: expected 'analytic' or 'posterior' with structure 'mmg', got"
-            f" {covariance!r}; leave it out, or choose another structure"
         )
     prior = None if options.prior is None else options.prior.source
     if prior is not None and options.reference_model is not None:

@@ -268,8 +268,6 @@ def _error_source(provenance: Mapping[str, Any]) -> str:
     if posterior and posterior["kept"]:
         return f"a posterior by sampling ({mixing_in_words(posterior)})"
     source = "the residuals of the fit, correlated in time and between the equations"
-    if provenance.get("uncertainty") == "bootstrap":
-        source = "refits to blocks of time drawn with replacement"
     error = provenance.get("model_error")
     if error:
         factor = number(error["factor"], 2)

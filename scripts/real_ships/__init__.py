@@ -15,12 +15,10 @@ from real_ships.section import Section
 
 #: Module of each case, in the order of the document.
 CASES = {
-    "a": "hsva",
-    "b": "marin",
-    "c": "mei",
-    "d": "esso_osaka",
-    "e": "captive",
-    "f": "mmg",
+    "a": "mmg",
+    "b": "mei",
+    "c": "esso_osaka",
+    "d": "captive",
 }
 
 

@@ -1,4 +1,4 @@
-"""(e) KVLCC2, static captive tests: truncated LS-SVM, reduced as by Xu et al. 2020.
+"""(d) KVLCC2, static captive tests: truncated LS-SVM, reduced as by Xu et al. 2020.
 
 81 steady conditions of drift, rudder and propeller loading, without yaw or
 acceleration: what they tell is the hull's response to drift and the rudder's force, not
@@ -247,7 +247,7 @@ def run(data: Data) -> Section:
         ),
     )
     return Section(
-        "KVLCC2, captive tests", text, {"real_ships_e.svg": _painter(tests, found)}
+        "KVLCC2, captive tests", text, {"real_ships_d.svg": _painter(tests, found)}
     )
 
 
@@ -297,5 +297,5 @@ tests with both are predicted:
 **Limits.** Without yaw or acceleration the tests identify neither inertia nor the
 damping of yaw; the cross terms of rudder and drift appear only in the tests with both.
 
-![Measured and modelled forces](images/real_ships_e.svg)
+![Measured and modelled forces](images/real_ships_d.svg)
 """

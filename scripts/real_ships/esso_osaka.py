@@ -1,4 +1,4 @@
-"""(d) Esso Osaka on a pond: starts from rest, strong wind, satellite spikes."""
+"""(c) Esso Osaka on a pond: starts from rest, strong wind, satellite spikes."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def run(data: Data) -> Section:
     return Section(
         "Esso Osaka, zigzags from rest in wind",
         text,
-        {"real_ships_d.svg": _painter(ship, found)},
+        {"real_ships_c.svg": _painter(ship, found)},
     )
 
 
@@ -250,5 +250,5 @@ here: a few short spikes hardly affect least squares over whole runs. Each run h
 own shaft speed (10 to 17 1/s), so that most predictions are at a speed that few of the
 other runs cover. A structure without the shaft speed keeps its speed.
 
-![Zigzags from rest](images/real_ships_d.svg)
+![Zigzags from rest](images/real_ships_c.svg)
 """

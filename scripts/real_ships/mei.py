@@ -1,4 +1,4 @@
-"""(c) KVLCC2, MARIN: RM-SVM on the four zigzags, as Mei et al. 2019."""
+"""(b) KVLCC2, MARIN: RM-SVM on the four zigzags, as Mei et al. 2019."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def run(data: Data) -> Section:
     return Section(
         "KVLCC2, RM-SVM on MARIN's four zigzags",
         text,
-        {"real_ships_c.svg": shown(ship, fitted)},
+        {"real_ships_b.svg": shown(ship, fitted)},
     )
 
 
@@ -170,5 +170,5 @@ record. First overshoots to starboard and to port, measured, degrees: {differenc
 linear correction of RM-SVM is fitted in the range of the zigzags; in the steady turn it
 is extrapolated, and may make the turn worse than that of the bare reference ship.
 
-![MARIN's zigzags and circles by RM-SVM](images/real_ships_c.svg)
+![MARIN's zigzags and circles by RM-SVM](images/real_ships_b.svg)
 """

@@ -25,11 +25,14 @@ from tests.agents.small_suite import write_suite
 
 LINEAR = (
     "--structure abkowitz --method ridge --preprocessing rts --hold-out"
-    " zigzag_15_15.csv --current none --wind none --prior auto --prior-strength 1"
-    " --uncertainty analytic --set alpha=0.01"
+    " zigzag_15_15.csv --current none --wind none --uncertainty analytic"
+    " --set alpha=0.01"
 )
 GREY = "--structure grey-box --reference-model mariner"
-WRONG = "--structure abkowitz --reference-model mariner --kernel none-such"
+WRONG = (
+    "--structure abkowitz --reference-model mariner --kernel none-such --prior auto"
+    " --prior-strength 1"
+)
 TASK = "--task calm --suite small.toml --allow-code reward.py"
 #: Sizes at which a rollout of learning takes a moment.
 SMALL = "--set ships=2 --set n_steps=16 --set batch_size=16 --set evaluate_every=32"
@@ -97,8 +100,7 @@ LINES = (
     ("reproduce nobody --markdown tables.md", 2),
     ("reproduce cao2015 --table nothing --row nothing", 2),
     (
-        f"identify ship.toml {LINEAR} --accept '{{heading_deg=1e3}}' --report"
-        " --out accepted",
+        f"identify ship.toml {LINEAR} --report --out reported",
         0,
     ),
     ("replay recordings/episode-00000.json --out replay.html", 0),

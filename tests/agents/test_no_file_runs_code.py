@@ -355,7 +355,6 @@ def test_the_command_and_the_loops_take_no_code_of_a_model(evil):
     [
         ("reference_model", "reference_model"),
         ("prior", "prior"),
-        ("anchor", "method.anchor"),
     ],
 )
 def test_a_ship_file_names_models_and_no_code(evil, option, full_name):

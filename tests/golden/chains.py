@@ -37,13 +37,8 @@ METHODS: Mapping[str, Mapping[str, Any]] = {
     },
     "output-error": {"method": "output-error"},
     "tmils": {"method": "tmils"},
-    "prior": {"prior": "container"},
     "nomoto euler": {"method": "ls", "samples": "euler", "structure": "nomoto"},
-    "cv-lssvr rts bootstrap": {
-        "method": "cv-lssvr",
-        "preprocessing": "rts",
-        "uncertainty": "bootstrap",
-    },
+    "cv-lssvr rts": {"method": "cv-lssvr", "preprocessing": "rts"},
 }
 #: The refinement stops when a step is small, so that its last digits depend on the way.
 TOLERANCES = {"": 1e-7, "output-error: ": 1e-5}

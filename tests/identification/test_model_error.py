@@ -9,7 +9,7 @@ import pytest
 from certainty import case
 
 from identification import IdentificationResult, Samples, Uncertainty, identify
-from identification.estimators.covariance import without_trial
+from identification.estimators.covariance import without_trials
 from identification.estimators.rm_svm import RMSVM
 from identification.judging.closed_loop import closed_loop, legs
 from identification.judging.model_error import (
@@ -50,7 +50,9 @@ def test_leaving_a_trial_out_of_the_normal_equations_is_a_fit_without_it(
     method: str,
 ) -> None:
     samples = made_up()
-    found, rest = without_trial(fit_all(get_method(method).make, samples), samples, 1)
+    found, rest = without_trials(
+        fit_all(get_method(method).make, samples), samples, [1]
+    )
     anew = fit_all(
         get_method(method).make,
         rest,

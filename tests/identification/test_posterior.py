@@ -187,7 +187,7 @@ def test_a_prior_that_trials_contradict_is_named(result, trials):
 
 
 def test_a_posterior_is_not_for_a_kernel(nomoto, trials):
-    with pytest.raises(InputError, match="'analytic' or 'bootstrap' with a kernel"):
+    with pytest.raises(InputError, match="expected 'analytic' with a kernel"):
         identify(trials, kernel="rbf", uncertainty="posterior")
     for settings in ({"steps": 3}, {"seed": -1}):
         with pytest.raises(InputError, match=r"uncertainty\.(steps|seed): expected"):

@@ -48,7 +48,7 @@ def read(table: dict[str, Any]) -> dict[str, Any]:
         ({"samples.window": 3}, "samples", Sampling(window=3)),
         ({"repair": True}, "preprocessing", Preprocessing(repair=True)),
         ({"preprocessing": "rts"}, "preprocessing", Preprocessing("rts")),
-        ({"uncertainty": "bootstrap"}, "uncertainty", Uncertainty("bootstrap")),
+        ({"uncertainty": "posterior"}, "uncertainty", Uncertainty("posterior")),
         ({"model_error": False}, "uncertainty", Uncertainty(model_error=False)),
         (
             {"kernel": "rbf", "centres": 9, "C": 3.0, "kernel_length": 2.0},
@@ -71,15 +71,12 @@ def test_a_stage_is_its_word_its_settings_or_a_table(
     assert read(table)[name] == expected
 
 
-def test_a_prior_has_a_strength_and_folds_of_its_own() -> None:
-    table = {"prior": "tanker", "prior_strength": 0.1, "prior.folds": "largest-rudder"}
-    found = read(table)["prior"]
+def test_a_prior_has_a_strength_of_its_own() -> None:
+    found = read({"structure": "mmg", "prior": "tanker", "prior_strength": 0.1})[
+        "prior"
+    ]
     assert isinstance(found, PriorKnowledge)
-    assert (found.source, found.strength, found.folds) == (
-        "tanker",
-        0.1,
-        "largest-rudder",
-    )
+    assert (found.source, found.strength) == ("tanker", 0.1)
 
 
 def test_settings_are_those_of_the_method_that_is_named() -> None:
@@ -89,11 +86,10 @@ def test_settings_are_those_of_the_method_that_is_named() -> None:
     named = read({"method": "ls-svm", "robust": True, "method.C": 3.0})["method"]
     assert isinstance(named, LSSVM)
     assert (named.robust, named.C) == (True, 3.0)
-    table = {"name": "output-error", "pull": 0.1, "rank": 3, "extra_trials": ["t.csv"]}
+    table = {"name": "output-error", "pull": 0.1, "rank": 3}
     refined = read({"method": table})["method"]
     assert isinstance(refined, Refinement)
     assert (refined.pull, refined.start.rank) == (0.1, 3)
-    assert refined.extra_trials == ["t.csv"]
 
 
 def test_every_setting_of_every_method_is_an_option_by_its_own_name() -> None:
@@ -127,15 +123,14 @@ def test_every_setting_of_every_method_is_an_option_by_its_own_name() -> None:
         ({"optimiser": {"name": "abc", "round": 3}}, r"optimiser: .*round"),
         ({"seed": -1}, "seed: "),
         ({"hold_out": "a.csv"}, r"hold_out: .*a list of names"),
-        ({"extra_trials": [3]}, "extra_trials: "),
         ({"structure": 3}, r"structure: .*3"),
         ({"name": " "}, "name: "),
         ({"method": "lsq"}, r"method: .*'lsq'"),
         ({"current": "tide"}, r"current: .*'tide'"),
-        ({"prior_strength": -1.0}, "prior_strength: "),
+        ({"prior_strength": -1.0}, r"prior\.strength: "),
         ({"centres": 101}, "centres: "),
         ({"model_error": "no"}, "model_error: "),
-        ({"segment_start": "x"}, r"segment_start: .*'free'"),
+        ({"staggered": "x"}, r"staggered: .*'x'"),
     ],
 )
 def test_a_wrong_option_is_named_with_its_place(

@@ -6,19 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from real_ships import CASES, Data, get_case
+from real_ships import Data
 from real_ships.captive import FORCES, combined, held_out, least_squares, read, study
 from real_ships.esso_osaka import LEAST_SPEED, under_way
-from real_ships.hsva import RUNS, SHIP, TRIPLES
-from real_ships.marin import MEASURED, full_scale
+from real_ships.marin import full_scale
 from real_ships.measures import mean_errors, turns, zigzag_errors
-from real_ships.mmg import CIRCLES, OTHERS, circle, fitted
-from real_ships.section import Section, marks, number, put, table
+from real_ships.mmg import CIRCLES, HSVA, OTHERS, circle, fitted
 
 from identification import PriorKnowledge
-from shipgym import InputError, ShipModel
-from shipgym.manoeuvres import zigzag
-from shipgym.models import load_model
+from shipgym import InputError
 
 SHIPS = Path(__file__).parents[1] / "ships"
 MEASURED_RUNS = Path(__file__).parents[2].parent / "shared" / "data"
@@ -29,56 +25,9 @@ measured = pytest.mark.skipif(
 )
 
 
-@pytest.fixture
-def data() -> Data:
-    return Data(SHIPS, MEASURED_RUNS)
-
-
-def test_the_page_has_a_place_for_each_case_and_says_by_which_command() -> None:
-    page = PAGE.read_text(encoding="utf-8")
-    for case in CASES:
-        first, last = marks(case)
-        assert page.count(first) == page.count(last) == 1
-        assert f"`python scripts/predict_real_ships.py {case}`" in page
-        assert callable(get_case(case))
-
-
-def test_a_section_replaces_its_earlier_self_and_nothing_else() -> None:
-    page = "before\n" + "\n".join(marks("a")) + "\nafter\n"
-    once = put(page, "a", Section("Title", "old"))
-    assert put(once, "a", Section("Title", "new")) == once.replace("old", "new")
-    assert once.startswith("before\n")
-    assert once.endswith("\nafter\n")
-
-
-def test_tables_show_a_dash_where_there_is_no_number() -> None:
-    assert number(float("nan")) == number(None) == "-"
-    assert table(["a", "b"], [[number(1.25, 1), "x"]]).splitlines()[-1] == "| 1.2 | x |"
-
-
-def test_a_ship_predicts_its_own_zigzag(mariner: ShipModel) -> None:
-    errors = zigzag_errors(mariner, zigzag(mariner, 20, 20, dt=0.5))
-    assert np.all(errors < (1e-3, 1e-2, 0.05, 0.05))
-
-
-def test_the_bare_reference_turns_alike_at_any_scale() -> None:
-    """KVLCC2 at 7 m: advance 3.08, tactical diameter 3.12 ship lengths."""
-    starboard, port = turns(load_model("kvlcc2-l7"))
-    assert starboard is not None
-    assert port is not None
-    assert starboard.advance_lengths == pytest.approx(3.080, abs=0.005)
-    assert starboard.tactical_diameter_lengths == pytest.approx(3.118, abs=0.005)
-    assert MEASURED == (3.25, 3.34)
-
-
-def test_every_triple_leaves_three_runs_and_all_runs_are_predicted() -> None:
-    assert {len(set(triple)) for triple in TRIPLES} == {3}
-    assert all(any(name not in triple for triple in TRIPLES) for name in RUNS)
-
-
 @measured
 def test_a_model_keeps_its_turn_when_it_is_taken_to_full_scale(data: Data) -> None:
-    hsva, marin = data.ship(SHIP, 20), data.ship("kvlcc2_marin", 10)
+    hsva, marin = data.ship(HSVA, 20), data.ship("kvlcc2_marin", 10)
     from identification import identify
 
     model = identify(
@@ -99,7 +48,7 @@ def test_the_mmg_form_of_three_zigzags_predicts_the_others_and_the_circle(
     data: Data,
 ) -> None:
     """Aims: 0.095 deg/s, 4.3 deg of heading, 4 % of diameter, 1.5 deg of drift."""
-    hsva = data.ship(SHIP, 4)
+    hsva = data.ship(HSVA, 4)
     model = fitted(hsva, prior=PriorKnowledge("kvlcc2-l7", 2.0))
     yaw_rate, heading, *_ = mean_errors(
         zigzag_errors(model, hsva.runs[name]) for name in OTHERS

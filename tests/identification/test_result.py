@@ -61,7 +61,7 @@ ship = ShipFile.load("examples/mariner/ship.toml")
 result = identify(
     ship.trials(), method="abc-lssvr",
     particulars=ship.particulars, steering=ship.steering,
-    hold_out=["zigzag_10_10.csv"], uncertainty="bootstrap",
+    hold_out=["zigzag_10_10.csv"],
 )
 result.save(sys.argv[1])
 write_report(result, sys.argv[1])
@@ -94,7 +94,6 @@ def test_the_same_call_on_the_same_data_writes_the_same_bytes(tmp_path: Path) ->
     settings = {
         "method": "abc-lssvr",
         "hold_out": ["zigzag_10_10.csv"],
-        "uncertainty": "bootstrap",
     }
     result = identify(
         ship.trials(), particulars=ship.particulars, steering=ship.steering, **settings

@@ -14,11 +14,11 @@ from __future__ import annotations
 from math import fabs, pi, sqrt
 from typing import Any
 
-from identification.models.formulas import clarke_derivatives
 from shipgym.engine.motion import Motion, Ship
 from shipgym.ships.equations import ShipEquations, record_of
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
+from tests.ships.clarke import clarke_derivatives
 from tests.ships.cross_flow import K_T_J, cross_flow, known, rudder_force
 
 DENSITY, GRAVITY, DEPTH = 1000.0, 9.81, 5.1
