@@ -16,7 +16,6 @@ from agents.identifying import (
     identify_ship,
     reduce_ship,
 )
-from identification.judging import selection
 from identification.models.methods import METHODS
 from identification.pipeline.reading import ARGUMENTS, stage_settings
 from shipgym import InputError, ShipFile, list_structures, load_model
@@ -98,7 +97,6 @@ def test_options_come_from_the_ship_file(ship, demo):
         ("rank = 3.5", r"ship.toml: \[identify\]: rank: .*3.5"),
         ('hold_out = ["a.csv"]', r"hold_out: .*'a.csv'"),
         ("epsilon = 0.1", r"ship.toml: epsilon: .*method 'tls-svm'"),
-        ('prior = "auto"', r"prior: expected none but with structure 'mmg'"),
     ],
 )
 def test_a_wrong_option_exits_with_2_and_is_named(ship, line, said, tmp_path):
@@ -364,15 +362,11 @@ def test_compare_ranks_structures_by_both_names(ship, tmp_path):
     )
 
 
-def test_without_a_structure_it_is_auto_but_for_what_needs_a_table(
-    ship, monkeypatch, tmp_path
-):
+def test_without_a_structure_it_is_auto_but_for_what_needs_a_table(ship, tmp_path):
     read = ShipFile.load(ship())
     assert identification_settings(read, {})["structure"] == "auto"
     assert "structure" not in identification_settings(read, {"kernel": "rbf"})
     assert identification_settings(read, {}, "abkowitz")["structure"] == "abkowitz"
-    monkeypatch.setattr(selection, "STRUCTURES", ("nomoto", "linear-steering", "mmg"))
-    monkeypatch.setattr(selection, "OTHERS", ())
     answer = shipgym("identify", ship(), "--report", "--out", tmp_path / "out")
     assert answer.exit_code == 0, answer.stderr
     assert (
