@@ -29,7 +29,6 @@ from shipgym.sea import (
 )
 from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.open_sea import Sea, SeaParameters
-from shipgym.sea.wind import gust_filter
 from shipgym.tasks.task import course_keeping_task
 from shipgym.trials.sensors import Sensors
 
@@ -137,47 +136,10 @@ def test_weather_from_port_is_the_mirror_image_of_that_from_starboard(mariner):
         )
 
 
-def test_wind_and_waves_from_abeam_set_a_ship_to_leeward(mariner):
-    body, at_rest = inert(mariner)
-    for weather in (steady_wind(90.0), Weather(waves=Waves(3.0, 9.0, 90.0))):
-        trial = ahead(body, weather, 40, state=at_rest)
-        assert trial["v"][-1] < 0.0  # from starboard to port
-        assert trial["y"][-1] < 0.0
-
-
 def test_the_air_a_ship_meets_in_her_own_way_is_in_her_model_already(mariner):
     """The least wind there is changes nothing: still air is no force."""
     windy = ahead(mariner, steady_wind(0.0, 1e-6), 100)
     np.testing.assert_allclose(windy["u"], ahead(mariner, steps=100)["u"], rtol=1e-7)
-
-
-def test_the_current_has_its_variance_and_correlation(mariner):
-    T, steps, dt = 50.0, 20000, 2.0
-    trial = ahead(mariner, Weather(current=Current(1.0, 30.0, 0.3, T)), steps, dt)
-    error = sampling_error(T, steps * dt)
-    for name, mean in (
-        ("current_north", np.cos(np.pi / 6)),
-        ("current_east", np.sin(np.pi / 6)),
-    ):
-        variation = trial[name] - mean
-        assert variation.var() == pytest.approx(0.09, rel=4.0 * error)
-        lag = round(T / dt)
-        correlation = np.mean(variation[:-lag] * variation[lag:]) / 0.09
-        assert correlation == pytest.approx(np.exp(-1.0), abs=4.0 * error)
-    north, east = trial["current_north"], trial["current_east"]
-    assert abs(np.corrcoef(north, east)[0, 1]) < 4.0 * error
-
-
-def test_gusts_have_the_variance_of_their_spectrum(mariner):
-    wind, steps, dt = Wind(12.0, 0.0), 20000, 2.0
-    trial = ahead(mariner, Weather(wind=wind), steps, dt)
-    T, deviation = gust_filter(wind)
-    assert trial["wind_speed"].std() == pytest.approx(
-        deviation, rel=2.0 * sampling_error(T, steps * dt)
-    )
-    assert trial["wind_speed"].mean() == pytest.approx(
-        12.0, abs=4.0 * deviation * np.sqrt(2.0 * T / (steps * dt))
-    )
 
 
 @pytest.mark.parametrize("dt", [0.2, 1.0])
@@ -391,22 +353,6 @@ def test_the_environment_shows_the_measured_and_rewards_the_slow_heading(mariner
     np.testing.assert_allclose(
         -rough.info("reward_heading"), (cost / np.radians(30.0)) ** 2, rtol=1e-9
     )
-
-
-def test_given_directions_are_kept_and_open_ones_are_drawn_anew(mariner):
-    given = engine(mariner, 3, GALE)
-    assert given.physical_state()["wind_from"] == pytest.approx(np.pi / 4)
-    drawn = engine(mariner, 500, "slight")
-    drawn.reset(np.arange(500))
-    directions = drawn.physical_state()["wind_from"]
-    assert abs(np.exp(1j * directions).mean()) < 4.0 / np.sqrt(500)
-    env = gymnasium.make(
-        "shipgym/CourseKeeping-v0", model="mariner", sea="slight"
-    ).unwrapped
-    env.reset(seed=0)
-    first = env.physical_state()["wind_from"]
-    env.reset()
-    assert env.physical_state()["wind_from"] != first
 
 
 def test_wrong_weather(mariner):
