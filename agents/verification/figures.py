@@ -18,8 +18,6 @@ from shipgym.plots import (
     MUTED,
     Panel,
     axis,
-    compact,
-    graph_objects,
     line,
     panels,
     points,
@@ -254,28 +252,3 @@ def _error_line(track: Track, length: float, name: str, colour: str) -> Any:
     distances = np.hypot(*steps.T)
     sailed = np.append(0.0, np.cumsum(distances))
     return line(sailed, track.cross_track, name, colour, 1.6)
-
-
-def costs_figure(costs: Mapping[str, Floats]) -> Figure:
-    """Box plot of the cost of each autopilot over the models drawn.
-
-    `costs`: by autopilot, of shape (n_draws,).
-    """
-    boxes = []
-    for (name, values), colour in zip(costs.items(), PILOT_COLOURS, strict=False):
-        box = graph_objects().Box(
-            x=compact(values),
-            name=name,
-            boxpoints="all",
-            jitter=0.6,
-            pointpos=0.0,
-            marker={"color": translucent(colour, 0.45), "size": 3.5},
-            line={"color": colour, "width": 1.6},
-            fillcolor=translucent(colour, 0.12),
-            showlegend=False,
-        )
-        boxes.append(box)
-    from_top = axis(autorange="reversed")
-    panel = Panel(boxes, "steering cost of an episode", from_top)
-    height = 90 * len(costs) + 90
-    return panels([panel], height, hovermode="closest")

@@ -1,22 +1,39 @@
 """The report of the whole chain: one self-contained HTML page that works offline."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import shipgym
+from agents.controllers.controller import Controller
 from agents.verification import figures
+from agents.verification.figures import criterion_name
 from agents.verification.result import STEP_DEG, AutopilotResult, Verification
-from agents.verification.view import (
-    cheaper_sentence,
-    headline,
-    is_certain,
-    verification_view,
-)
 from identification import IdentificationResult
 from identification.judging.warnings import held_out_error
 from identification.report.view import fit_view, trial_figures
 from shipgym.files import write_text
-from shipgym.pages import NONE, render
+from shipgym.manoeuvres import Criterion
+from shipgym.pages import NONE, fixed, number, render
+
+#: What a controller feeds back: name, and unit of the gain on it.
+SIGNALS = {
+    "heading_error": ("heading error", "rad/rad"),
+    "yaw_rate": ("yaw rate", "s"),
+    "heading_error_integral": ("integral of heading error", "1/s"),
+    "sway": ("sway speed", "rad s/m"),
+    "rudder": ("rudder", "rad/rad"),
+}
+#: Name and unit of each margin.
+MARGINS = {
+    "gain_margin": ("gain margin, upwards", "factor"),
+    "lowest_gain": ("gain margin, downwards", "factor"),
+    "phase_margin_deg": ("phase margin", "deg"),
+    "delay_margin_s": ("delay margin", "s"),
+    "bandwidth_rad_s": ("bandwidth", "rad/s"),
+}
 
 
 def write_report(result: AutopilotResult, path: str | Path) -> None:
@@ -26,29 +43,29 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
     model's own. `result`: what the chain found; `path`: the HTML file. Raises
     InputError if plotly is not installed.
     """
+    verdict, kind = verdict_of(result)
     found = result.verification
-    view = None
-    cheaper = None
-    drawn: dict[str, Any] = {}
+    data: dict[str, Any] = {}
     if found is not None:
         length = float(result.model.particulars["length"])
-        view = verification_view(found, length)
-        cheaper = cheaper_sentence(view)
         drawn = result_figures(result.identification, found, length)
-    verdict, kind = verdict_of(result)
+        data = {"figures": drawn, **designs_of(found)}
     page = render(
         "agents.verification/report.html",
         ship=result.ship.particulars.name,
+        length=float(result.ship.particulars.length),
         fit=fit_view(result.identification),
-        found=view,
-        cheaper=cheaper,
-        figures=drawn,
+        found=found,
+        metrics=result.metrics,
         verdict=verdict,
         verdict_kind=kind,
         refusal=result.refusal,
         step_deg=STEP_DEG,
         origin=_origin(result),
         trials=result.trials,
+        criterion_name=criterion_name,
+        interval=_interval,
+        **data,
     )
     write_text(page, Path(path))
 
@@ -56,16 +73,12 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
 def _origin(result: AutopilotResult) -> dict[str, str]:
     """Where the model comes from, by what the page calls it."""
     provenance = result.model.provenance or {}
-    how = []
-    for key in ("structure", "method", "samples"):
-        how.append(str(provenance.get(key, NONE)))
-    origin = ", ".join(how)
+    keys = ("structure", "method", "samples")
     own_version = f"shipgym {shipgym.__version__}"
-    software = provenance.get("software", own_version)
     return {
-        "software": software,
+        "software": provenance.get("software", own_version),
         "ship file": result.ship.path.name,
-        "structure, method, samples": origin,
+        ", ".join(keys): ", ".join([str(provenance.get(key, NONE)) for key in keys]),
     }
 
 
@@ -93,28 +106,125 @@ def verdict_of(result: AutopilotResult) -> tuple[str, str]:
     return " ".join(sentences), kind
 
 
+def is_certain(found: Verification) -> bool:
+    """Return True if all criteria are met and no model drawn is lost.
+
+    A model is lost that runs away in a manoeuvre, or under the best autopilot.
+    """
+    criteria = found.manoeuvres.criteria.values()
+    lost = found.pilots[0].episodes.terminated
+    is_met = all(criterion.passed for criterion in criteria)
+    return is_met and not found.manoeuvres.unstable.any() and not lost.any()
+
+
+def headline(found: Verification) -> str:
+    """The verdict in two or three sentences."""
+    sentences = _criteria_sentences(found.manoeuvres.criteria)
+    unstable = int(found.manoeuvres.unstable.sum())
+    if unstable:
+        sentences.append(
+            f"{unstable} of {found.draws} models drawn run away in a manoeuvre."
+        )
+    best = found.pilots[0]
+    lost = int(np.sum(best.episodes.terminated))
+    control = f"loses control of {lost} of" if lost else "keeps control of all"
+    sentences.append(
+        f"{best.name} steers best and {control} {found.draws} models drawn."
+    )
+    if found.left_out:
+        sentences.append(
+            f"{found.left_out} of the models run away whatever steers them, in the"
+            " trials themselves or straight ahead, and do not count."
+        )
+    return " ".join(sentences)
+
+
+def _criteria_sentences(criteria: Mapping[str, Criterion]) -> list[str]:
+    """The verdict on the IMO criteria, and those that are not decided."""
+    missed: list[str] = []
+    undecided: list[str] = []
+    for name, criterion in criteria.items():
+        words = criterion_name(name, criterion).lower()
+        if criterion.passed is False:
+            missed.append(words)
+        if not criterion.decided:
+            undecided.append(words)
+
+    verdict = "and meets all IMO criteria"
+    if missed:
+        verdict = f"but misses the IMO criterion of {', '.join(missed)}"
+    elif undecided:
+        verdict = "and misses no IMO criterion that these trials decide"
+    sentences = [f"The model is stable {verdict}."]
+    if undecided:
+        sentences.append(f"Not decided by these trials: {', '.join(undecided)}.")
+    return sentences
+
+
+def _interval(criterion: Criterion) -> str:
+    """The 95 % interval of a criterion in words."""
+    if criterion.interval is None:
+        return NONE
+    low, high = criterion.interval
+    upper = "no upper bound" if high is None else fixed(high)
+    return f"{fixed(low)} to {upper}"
+
+
+def designs_of(found: Verification) -> dict[str, Any]:
+    """Names, gains and margins of the designs, for the tables of the page."""
+    designs: dict[str, Controller] = {}
+    learned = []
+    for pilot in found.by_name:
+        if pilot.design is None:
+            learned.append(pilot.name)
+        else:
+            designs[pilot.name] = pilot.design
+    linear = {name: design for name, design in designs.items() if design.feedback}
+    margins = []
+    for field, words in MARGINS.items():
+        values = [getattr(design.margins, field) for design in designs.values()]
+        shown = ["∞" if value == np.inf else number(value) for value in values]
+        margins.append((*words, shown))
+    return {
+        "designs": list(designs),
+        "learned": learned,
+        "linear": linear,
+        "gains": _gain_rows(linear),
+        "margins": margins,
+    }
+
+
+def _gain_rows(designs: Mapping[str, Controller]) -> list[tuple[str, str, list[Any]]]:
+    """Signal, unit, and of each design name and value of the gain, or None."""
+    by_signal = []
+    for design in designs.values():
+        own = {}
+        for gain, (signal, _) in design.feedback.items():
+            own[signal] = gain, design.gains[gain]
+        by_signal.append(own)
+    rows = []
+    for signal, words in SIGNALS.items():
+        gains = [own.get(signal) for own in by_signal]
+        if any(gains):
+            rows.append((*words, gains))
+    return rows
+
+
 def result_figures(
     fit: IdentificationResult, found: Verification, length: float
 ) -> dict[str, Any]:
     """Figures of an identification and a verification by name."""
-    return {**trial_figures(fit), **verification_figures(found, length)}
-
-
-def verification_figures(found: Verification, length: float) -> dict[str, Any]:
-    """Figures of a verification by name."""
     responses = {}
-    costs = {}
     for pilot in found.by_name:
         step = pilot.step
         responses[pilot.name] = (step.heading, step.rudder)
-        costs[pilot.name] = pilot.episodes.cost
     t = found.pilots[0].step.t
     manoeuvres = found.manoeuvres
     shown = {
+        **trial_figures(fit),
         "criteria": figures.criteria_figure(manoeuvres.criteria),
         "manoeuvres": figures.manoeuvres_figure(manoeuvres, length),
         "steps": figures.steps_figure(t, responses, STEP_DEG),
-        "costs": figures.costs_figure(costs),
     }
     if found.tracks:
         tracks = {track.key.upper(): track for track in found.tracks}

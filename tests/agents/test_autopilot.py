@@ -110,7 +110,7 @@ def test_a_learned_guest_flies_beside_them_without_gains_and_margins(chain, tmp_
     assert told["lq"] == verification_metrics(result.verification)["controllers"]["lq"]
     write_report(replace(result, verification=found), tmp_path / "report.html")
     assert (
-        "LEARNED was trained earlier, on another model"
+        "Trained earlier, on another model, and used unchanged: LEARNED."
         in (tmp_path / "report.html").read_text()
     )
     table = ranking_table(replace(result, verification=found))

@@ -84,7 +84,7 @@ def test_manoeuvres_are_drawn_in_degrees_and_ship_lengths():
     )
 
 
-def test_steps_and_costs_are_those_of_each_autopilot():
+def test_steps_are_those_of_each_autopilot():
     t = np.arange(3.0)
     heading = np.radians([[0.0, 10.0, 20.0], [0.0, 12.0, 22.0], [0.0, 8.0, 18.0]])
     figure = figures.steps_figure(
@@ -103,8 +103,3 @@ def test_steps_and_costs_are_those_of_each_autopilot():
     assert len(traces(figure, "lq")) == 2
     course = only(figure, "set course")
     assert (list(course.x), list(course.y)) == ([0.0, 2.0], [20.0, 20.0])
-    boxes = figures.costs_figure({"pid": np.array([1.0, 2.0]), "lq": np.array([0.5])})
-    assert [(box.name, list(box.x)) for box in boxes.data] == [
-        ("pid", [1.0, 2.0]),
-        ("lq", [0.5]),
-    ]

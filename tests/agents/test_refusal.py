@@ -12,6 +12,7 @@ from agents.identifying import identification_settings, identify_ship
 from agents.rollouts.course_keeping import sail
 from agents.verification.chain import or_simpler, write_agents, write_findings
 from agents.verification.closed_loop import SHARES, ClosedLoop, loses_too_many
+from agents.verification.page import designs_of
 from agents.verification.possible_draws import gathers_speed, is_possible
 from agents.verification.refusal import (
     Steering,
@@ -25,7 +26,6 @@ from agents.verification.refusal import (
     why_refused,
 )
 from agents.verification.result import verification_metrics
-from agents.verification.view import verification_view
 from identification.design.experiment import advise
 from shipgym import InputError, ShipFile, Trial, load_model
 
@@ -266,10 +266,10 @@ def test_a_model_that_is_refused_gives_a_report_that_says_why(chain, tmp_path):
 
 def test_gains_have_one_sign_in_report_and_metrics(chain):
     found = chain[1].verification
-    view = verification_view(found, 160.93)
-    shown = {row.signal: row.gains for row in view.gains}
+    view = designs_of(found)
+    shown = {signal: gains for signal, _, gains in view["gains"]}
     metrics = verification_metrics(found)["controllers"]
-    own = dict(zip(view.linear, shown["yaw rate"], strict=True))
+    own = dict(zip(view["linear"], shown["yaw rate"], strict=True))
     assert own["PID"] == ("derivative", metrics["pid"]["gains"]["derivative"])
     assert own["LQ"] == ("yaw_rate", metrics["lq"]["gains"]["yaw_rate"])
 

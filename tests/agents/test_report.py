@@ -166,7 +166,7 @@ def test_designs_that_are_refused_are_warned_of(chain, capsys):
 
 def test_every_figure_has_a_caption_and_a_place(source):
     names = re.findall(r'Plotly.newPlot\("plot-([\w-]+)"', source)
-    assert len(names) == len(set(names)) == source.count("<figcaption>") == 8
+    assert len(names) == len(set(names)) == source.count("<figcaption>") == 7
     for name in names:
         assert f'id="plot-{name}"' in source
 
@@ -177,7 +177,7 @@ def test_a_browser_without_network_draws_every_figure_also_for_paper(chain):
     browser = Browser()
     try:
         browser.open(address)
-        browser.wait("document.querySelectorAll('.plot.js-plotly-plot').length === 8")
+        browser.wait("document.querySelectorAll('.plot.js-plotly-plot').length === 7")
         browser.run("window.print = () => { window.printed = true; }")
         browser.click(".print")
         browser.wait("window.printed")
@@ -186,7 +186,7 @@ def test_a_browser_without_network_draws_every_figure_also_for_paper(chain):
             " plot._fullLayout.width)"
         )
         browser.run("window.dispatchEvent(new Event('beforeprint'))")
-        assert browser.run(widths) == 8 * [690]  # as wide as the paper
+        assert browser.run(widths) == 7 * [690]  # as wide as the paper
         browser.run("window.dispatchEvent(new Event('afterprint'))")
         assert min(browser.run(widths)) > 690
         assert (browser.complaints, browser.requests) == ([], [address])
@@ -252,7 +252,7 @@ def test_hostile_names_of_ship_trials_and_autopilots_stay_text(chain, tmp_path):
     )
     write_report(hostile, tmp_path / "report.html")
     source = (tmp_path / "report.html").read_text()
-    assert Page(source).scripts == 10  # plotly.js, eight figures, printing
+    assert Page(source).scripts == 9  # plotly.js, seven figures, printing
     assert "<script>alert" not in source
     assert f"{HOSTILE}0" in " ".join(Page(source).text)
     assert HOSTILE.upper() in " ".join(Page(source).text)
@@ -284,7 +284,6 @@ def test_hostile_names_of_models_and_manoeuvres_stay_text(tmp_path):
         ("loop_height_deg_s", "loop height, deg/s"),
         ("tactical_diameter_lengths", "tactical diameter, ship lengths"),
         ("period_s", "period, s"),
-        ("final_speed", "final speed, m/s"),
         ("steady_speed_ratio", "steady speed ratio"),
     ],
 )

@@ -8,12 +8,12 @@ import pytest
 
 from agents import PID, WheelOver
 from agents.verification.chain import build_autopilot, stage
+from agents.verification.page import headline, is_certain
 from agents.verification.refusal import lost_track
 from agents.verification.result import pilot_metrics, track_metrics
 from agents.verification.tracks import keep_track, track_task
 from agents.verification.tuned import holds_draws, model_task
 from agents.verification.verify import unique_keys
-from agents.verification.view import headline, is_certain
 from identification.progress import PROGRESS
 from shipgym import Current, InputError, Weather, load_model
 from shipgym.tasks.task import path_following_task
