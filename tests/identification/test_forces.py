@@ -12,12 +12,10 @@ from papers.xu2020_tank import PMM18, PMM38, TABLE_11, xu_ship
 
 from identification import identify
 from identification.models.forces import (
-    between_jumps,
     force_regression,
     identify_forces,
 )
 from shipgym import InputError, Particulars, ShipModel, Trial
-from shipgym.ships.shared_structure import shared_structure
 
 # a stand-in for what the paper does not print: a coaster's mass
 PARTICULARS = Particulars(
@@ -93,17 +91,6 @@ def test_the_models_have_the_coefficients_of_the_paper() -> None:
     assert {"X_udot", "Y_vdot", "Y_rdot"} < set(PMM18.names("r"))
 
 
-def test_each_term_stands_once_and_before_those_of_the_mass() -> None:
-    named = {"u": "X_uuu -Y_vdot:vr X_uvv", "v": "Y_v Y_uv", "r": "N_r Y_v"}
-    table = shared_structure("mine", "own", named)
-    assert [term.name for term in table.terms("u")] == ["uuu", "uvv", "vr", "rr"]
-    assert sorted(term.name for term in table.terms("r")) == ["r", "ur", "uv", "v"]
-    assert table.terms("v") == table.terms("r")
-    assert table.coefficient_names == ("X_uuu", "Y_vdot", "X_uvv", "Y_v", "Y_uv", "N_r")
-    signs = {share.coefficient: share.sign for share in table.shares["u"]}
-    assert signs == {"X_uuu": 1.0, "Y_vdot": -1.0, "X_uvv": 1.0}
-
-
 @pytest.mark.parametrize("model_inertia", [True, False])
 def test_table_11_is_recovered_from_the_virtual_tank(model_inertia: bool) -> None:
     """Added mass, and coefficients of three equations, from all tests at once."""
@@ -137,16 +124,6 @@ def test_the_full_model_explains_the_tests_but_not_all_its_coefficients() -> Non
     assert min(model.provenance["r_squared"].values()) > 1.0 - 1e-9
     for name in ("X_udot", "Y_vdot", "Y_rdot", "N_vdot", "N_rdot"):
         assert model.coefficients[name] == pytest.approx(TABLE_11[name], rel=1e-5), name
-
-
-def test_the_regression_stacks_x_y_and_n() -> None:
-    regression = force_regression(tank_tests(), PMM18, PARTICULARS)
-    assert regression.features.shape == (len(regression), 18)
-    assert np.bincount(regression.equation).tolist() == [len(regression) // 3] * 3
-    truth = np.array(list(SHIP.coefficients.values()))
-    assert min(regression.r_squared(truth).values()) > 1.0 - 1e-9
-    shared = regression.features[:, regression.names.index("Y_vdot")]
-    assert all(np.abs(shared[regression.equation == i]).max() > 0.0 for i in range(3))
 
 
 def test_trials_of_the_other_kind_are_refused() -> None:
@@ -185,20 +162,3 @@ def test_tests_that_tell_nothing_are_refused() -> None:
         force_regression([stopped], PMM18, PARTICULARS)
     with pytest.raises(InputError, match="particulars: expected at least length"):
         identify_forces([run], "pmm18", None)
-
-
-def test_a_test_of_jumps_alone_is_refused_and_rounding_is_none() -> None:
-    steps = np.repeat([0.0, 0.2, 0.4], 3)
-    run = {name: np.ones(9) for name in ("X", "Y", "N", "u")} | {
-        "v": -steps,
-        "r": np.zeros(9),
-    }
-    with pytest.raises(
-        InputError,
-        match="trial 'held': expected 4 samples somewhere between",
-    ):
-        force_regression([Trial(np.arange(9.0), run, name="held")], PMM18, PARTICULARS)
-    for off, pieces in ((1.9e-9, 1), (2.1e-9, 2)):  # of the largest velocity
-        u = np.where(np.arange(12) < 6, 5.0, 5.0 * (1.0 + off))
-        held = Trial(np.arange(12.0), {"u": u, "v": np.zeros(12), "r": np.zeros(12)})
-        assert len(between_jumps(held)) == pieces

@@ -134,15 +134,6 @@ def test_l_curve_drops_the_direction_that_noise_owns() -> None:
     assert np.abs(LSSVM(C=np.inf).fit(X, y).coef_[2]) > 10.0
 
 
-def test_exact_copy_of_a_feature_is_dropped_by_every_selection() -> None:
-    X, y, _ = regression(m=3)
-    copied = np.column_stack([X, X[:, 2]])
-    for selection in ("l-curve", "gcv", "full"):
-        estimator = TruncatedLSSVM(selection=selection).fit(copied, y)
-        assert estimator.rank_ <= 3
-        assert estimator.coef_[2] == pytest.approx(estimator.coef_[3], rel=1e-6)
-
-
 def test_intervals_cover_the_truth_in_95_per_cent() -> None:
     X, _, coefficients = regression(n=200)
     rng = np.random.default_rng(2)
@@ -219,18 +210,6 @@ def test_robust_fit_is_not_moved_by_outliers(estimator: Any) -> None:
         )
         gains.append(plain / robust)
     assert np.median(gains) > 5.0
-
-
-def test_the_noise_of_as_many_samples_as_directions_is_not_known() -> None:
-    X, y = np.array([[1.0, 0.2], [0.3, 1.0]]), np.array([1.0, 2.0])
-    exact = TruncatedLSSVM(selection="full", fit_intercept=False).fit(X, y)
-    assert np.isnan(exact.noise_variance_)
-    assert np.isnan(exact.covariance_).all()
-    three = TruncatedLSSVM(selection="full", fit_intercept=False).fit(
-        np.vstack([X, [1.0, 1.0]]), [1.0, 2.0, 4.0]
-    )
-    residual = np.array([1.0, 2.0, 4.0]) - np.vstack([X, [1.0, 1.0]]) @ three.coef_
-    assert three.noise_variance_ == pytest.approx(residual @ residual)
 
 
 def test_an_rbf_kernel_without_intercept_is_kernel_ridge_regression() -> None:

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_smoothing_spline
 
-from identification import identify
 from identification.samples.preprocess import (
     noise_level,
-    outliers,
     repaired,
     smooth,
     smoothed_channels,
@@ -78,42 +76,6 @@ def test_outliers_and_short_dropouts_are_repaired_and_told(
     assert repaired(mended)["u"].max() < 9.0
 
 
-def test_the_first_and_the_last_sample_may_be_outliers() -> None:
-    t = np.arange(200.0)
-    u = np.sin(0.05 * t) + 1e-3 * np.random.default_rng(0).standard_normal(200)
-    u[[0, -1]] += 0.5
-    assert np.flatnonzero(outliers(t, u, may_step=False)).tolist() == [0, 199]
-    found = repaired(Trial(t, {"u": u, "delta": u}, name="ends"))
-    assert found.repaired == {"u": 2}
-    assert found["u"][[0, -1]] == pytest.approx(u[[1, -2]])
-    for inside in (1, -2):
-        spiked = np.sin(0.05 * t)
-        spiked[inside] += 0.5
-        assert np.flatnonzero(outliers(t, spiked, may_step=False)).tolist() == [
-            inside % 200
-        ]
-    for clean in (
-        0.1 * t,
-        np.sin(0.05 * t),
-        np.abs(t - 196.0),
-        np.minimum(t, 5.0),
-        np.exp(-0.3 * t),
-    ):
-        assert not outliers(t, clean, may_step=False).any()
-    gap = np.append(t[:-40], t[-1])
-    assert not outliers(gap, 0.1 * gap, may_step=False).any()
-
-
-def test_a_rudder_put_over_at_the_first_or_the_last_sample_is_no_outlier() -> None:
-    t = np.arange(0.0, 600.0, 10.0)
-    for angles in ([0.0, 23.0, *[35.0] * 58], [*[10.0] * 59, 20.0]):
-        delta = np.radians(angles)
-        assert (
-            repaired(Trial(t, {"delta": delta}, name="rudder"))["delta"].tolist()
-            == delta.tolist()
-        )
-
-
 def test_clean_trials_are_left_alone(cao_zigzag: Trial) -> None:
     assert repaired(cao_zigzag) is cao_zigzag
     assert cao_zigzag.raw is cao_zigzag
@@ -150,13 +112,6 @@ def test_kalman_smoother_takes_the_channels_there_are(
         assert np.std(smoothed[channel] - truth[channel]) < 0.7 * before
 
 
-def test_preprocessing_that_does_not_exist_is_refused(
-    mariner: ShipModel, cao_zigzag: Trial
-) -> None:
-    with pytest.raises(InputError, match=r"preprocessing: expected .*got 'fourier'"):
-        identify([cao_zigzag], preprocessing="fourier", particulars=mariner.particulars)
-
-
 def test_noise_is_told_by_the_change_over_a_window() -> None:
     """White noise of 0.1 on a ramp of 0.5 a sample: sqrt(2) 0.1 by its change."""
     t = np.arange(20_000.0)
@@ -191,29 +146,6 @@ def test_steps_of_one_and_a_half_to_ten_and_a_half_usual_ones_are_filled(
     inside = found.t[59 : 61 + missing]
     np.testing.assert_allclose(np.diff(inside), step * hole / (missing + 1))
     np.testing.assert_allclose(found["u"], 3.0 + 0.01 * found.t)
-
-
-def test_a_channel_of_outliers_is_refused() -> None:
-    t = np.arange(400.0)
-    clean = np.sin(0.05 * t) + 1e-3 * np.random.default_rng(0).standard_normal(400)
-    for every, refused in (
-        (35, False),
-        (25, True),
-    ):  # three beside each other, 9 and 12 % of all
-        spiked = clean + np.where(
-            (t % every >= 10.0) & (t % every < 13.0) & (t < 390.0), 5.0, 0.0
-        )
-        trial = Trial(t, {"u": spiked}, name="spiked")
-        if refused:
-            with pytest.raises(
-                InputError,
-                match=r"spiked': expected at most a tenth of u to be outliers, got 4",
-            ):
-                repaired(trial)
-        else:
-            found = repaired(trial)
-            np.testing.assert_allclose(found["u"], clean, atol=0.05)
-            assert found.raw is not None
 
 
 def test_channels_are_smoothed_as_named_but_for_the_rudder() -> None:

@@ -193,14 +193,3 @@ def test_settings_out_of_range_are_named(estimator: Any, message: str) -> None:
     X, y = regression()
     with pytest.raises(InputError, match=message):
         estimator.fit(X, y)
-
-
-def test_samples_count_by_how_often_and_how_long_ago_they_were_used() -> None:
-    """With three innovations the last sample once, the one before twice."""
-    X, y = regression(6)
-    found = MultiInnovationLeastSquares(forgetting=0.5, innovations=3).fit(X, y)
-    np.testing.assert_allclose(
-        found.weights_, np.array([3, 3, 3, 3, 2, 1]) * 0.5 ** np.arange(5.0, -1.0, -1)
-    )
-    every = RecursiveLeastSquares(start_samples=2, start_interval=2).fit(X, y)
-    np.testing.assert_array_equal(every.weights_, [1.0, 0.0, 1.0, 0.0, 1.0, 1.0])

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.samples.gear_response import GearResponse, goes_on
-from identification.samples.rudder import estimated_gear, rebuild, straight
+from identification.samples.gear_response import GearResponse
+from identification.samples.rudder import estimated_gear, rebuild
 from shipgym import ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
 
@@ -77,14 +77,6 @@ def test_rudder_that_no_gear_explains_is_taken_straight() -> None:
     assert rebuilt(10.25) == pytest.approx(0.75 * delta[10] + 0.25 * delta[11])
 
 
-def test_a_gear_needs_eight_samples_for_each_change_of_order() -> None:
-    t = np.arange(40.0)
-    delta = np.radians(np.interp(t, [3, 13, 18, 28], [0, 10, 10, 0]))
-    assert rebuild(t, delta).follows_gear
-    sawtooth = np.radians(np.interp(t, np.arange(0.0, 40.0, 4.0), [0, 4] * 5))
-    assert not rebuild(t, sawtooth).follows_gear
-
-
 def test_limit_of_an_estimated_gear_is_the_largest_recorded_angle() -> None:
     t = np.linspace(0.0, 40.0, 81)
     delta = np.radians(np.clip(4.0 * t, 0.0, 42.0))
@@ -94,65 +86,6 @@ def test_limit_of_an_estimated_gear_is_the_largest_recorded_angle() -> None:
     )
     assert gear.rudder_limit_deg == pytest.approx(42.0)
     assert gear.rudder_rate_deg_s == pytest.approx(4.0)
-
-
-def test_a_rudder_taken_straight_has_no_gear_and_no_corners() -> None:
-    t = np.arange(5.0, 9.0)
-    found = straight(t, np.array([0.0, 0.1, 0.3, 0.2]))
-    assert (found.rate, found.time_constant, found.follows_gear) == (0.0, 0.0, False)
-    for row in (
-        found.before,
-        found.after,
-        found.switch,
-        found.corners,
-        found.smoothness,
-    ):
-        assert row.shape == (0,)
-    assert found.smoothness.dtype == np.int64
-    np.testing.assert_allclose(found([5.5, 6.25, 8.0]), [0.05, 0.15, 0.2])
-
-
-def test_four_samples_are_the_fewest_that_a_gear_explains() -> None:
-    """A ramp goes on; a rudder that never moved has no gear."""
-    ramp, gear = 0.1 * np.arange(5.0), GearResponse(0.1, 0.0)
-    shares = [gear.explained_share(np.arange(float(n)), ramp[:n]) for n in (3, 4, 5)]
-    assert shares == [0.0, 1.0, 1.0]
-    assert GearResponse(0.0, 0.0).explained_share(np.arange(5.0), ramp) == 0.0
-
-
-@pytest.mark.parametrize(
-    ("orders", "delta", "expected"),
-    [
-        ([np.inf, np.inf], [0.0, 0.1, 0.2], True),  # one ramp
-        ([np.inf, -np.inf], [0.0, 0.1, 0.0], False),
-        ([np.inf, 0.15], [0.0, 0.1, 0.15], True),  # it arrives
-        ([np.inf, 0.1], [0.0, 0.1, 0.1], True),
-        ([np.inf, 0.05], [0.0, 0.1, 0.05], False),
-        ([-np.inf, -0.15], [0.0, -0.1, -0.15], True),
-        ([-np.inf, -0.05], [0.0, -0.1, -0.05], False),
-        ([0.1, 0.1009], [0.0, 0.1, 0.1009], True),  # within the tolerance
-        ([0.1, 0.1015], [0.0, 0.1, 0.1015], False),
-        ([0.1, np.inf], [0.0, 0.1, 0.2], False),  # from rest to a ramp
-        ([0.0, np.inf], [0.0, 0.0, 0.1], False),
-    ],
-)
-def test_an_order_goes_on_where_the_rudder_moves_as_before(
-    orders: list[float], delta: list[float], expected: bool
-) -> None:
-    """Orders that differ by a thousandth of the rudder's range are one."""
-    found = goes_on(np.array([*orders, 0.0]), np.array([*delta, delta[0] - 1.0]))
-    assert found.tolist()[0] is expected
-
-
-def test_an_order_changes_within_an_interval_when_the_rudder_ends_as_seen() -> None:
-    """At rest for 29.7 s, then moving at 0.1 rad/s, seen every 2 s."""
-    t = 2.0 * np.arange(31.0)
-    fine = np.linspace(0.0, 60.0, 601)
-    angles = 0.1 * np.maximum(fine - 29.7, 0.0)
-    found = rebuild(t, np.interp(t, fine, angles))
-    assert found.corners == pytest.approx([29.7], abs=1e-6)
-    assert found.smoothness.tolist() == [0]
-    np.testing.assert_allclose(found(fine), angles, atol=1e-6)
 
 
 def test_a_gear_of_rate_and_lag_ramps_and_then_creeps() -> None:
@@ -167,12 +100,3 @@ def test_a_gear_of_rate_and_lag_ramps_and_then_creeps() -> None:
     t = np.array([0.0, 1.0, 3.0, 5.0])
     orders = gear.orders(t, gear.angle(0.0, 0.5, t))
     np.testing.assert_allclose(orders, [np.inf, np.inf, 0.5])
-
-
-def test_no_rudder_goes_beyond_a_right_angle() -> None:
-    t = np.linspace(0.0, 40.0, 81)
-    still, delta = np.zeros_like(t), np.radians(np.clip(4.0 * t, 0.0, 110.0))
-    gear = estimated_gear(
-        [Trial(t, {"u": still + 5.0, "v": still, "r": still, "delta": delta})]
-    )
-    assert gear.rudder_limit_deg == 90.0

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-import gymnasium
 import numpy as np
 import pytest
 
@@ -12,7 +9,6 @@ import shipgym
 from identification import identify
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import turning_circle, zigzag
-from shipgym.models.linear import nomoto
 from shipgym.ships import structures
 from shipgym.ships.structures import get_structure, list_structures
 
@@ -213,115 +209,6 @@ def test_the_container_ship_is_predicted_by_four_terms_as_well_as_zhu_printed() 
     assert np.degrees(rmse["r"]) ** 2 < 0.0162
 
 
-def test_cubic_follows_the_speed_loss_of_the_container_ship() -> None:
-    ship = shipgym.load_model("container")
-    trials = zigzags(ship)
-    to_validate = trials[1].with_(use="validate")
-    fit = identify(
-        [trials[0], to_validate, trials[2]], "cubic", particulars=ship.particulars
-    )
-    assert fit.stable
-    assert fit.model.service_shaft_speed == pytest.approx(ship.service_shaft_speed)
-    rmse = fit.metrics["trials"]["zigzag_20"]["rmse"]
-    assert rmse["u"] < 0.02 * np.ptp(to_validate["u"])
-    assert rmse["r"] < 0.02 * np.ptp(to_validate["r"])
-
-
-def test_nomoto2_is_the_exact_form_of_a_linear_ship() -> None:
-    """Sway taken out of linear steering leaves K, T1, T2, T3."""
-    ship = ship_of("linear-steering", PRIME)
-    small = (
-        zigzag(ship, 1.0, 1.0, port, duration=600, dt=0.1) for port in (False, True)
-    )
-    runs = [with_constant_speed(recorded(run, f"{i}")) for i, run in enumerate(small)]
-    found, expected = (
-        nomoto(identify(runs, "nomoto2", particulars=PARTICULARS).model),
-        nomoto(ship),
-    )
-    for name in ("K", "T1", "T2", "T3"):
-        assert getattr(found, name) == pytest.approx(
-            getattr(expected, name), rel=0.01
-        ), name
-
-
-def with_constant_speed(run: Trial) -> Trial:
-    """The run as its yaw alone shows it."""
-    return Trial(
-        run.t,
-        {**run.channels, "u": np.full(len(run.t), U0), "v": np.zeros(len(run.t))},
-        name=run.name,
-    )
-
-
-def test_time_constants_survive_the_noise_of_a_rate_gyro() -> None:
-    """0.02 deg/s: the regression forms no derivative of the yaw rate."""
-    ship = ship_of("nomoto2", own("nomoto2"))
-    random = np.random.default_rng(0)
-    noisy = [
-        Trial(
-            t.t,
-            {
-                **t.channels,
-                "r": t["r"] + np.radians(0.02) * random.standard_normal(len(t.t)),
-            },
-            name=t.name,
-        )
-        for t in zigzags(ship)
-    ]
-    found = nomoto(identify(noisy, "nomoto2", particulars=PARTICULARS).model)
-    np.testing.assert_allclose([found.K, found.T], [0.185, 107.3], rtol=0.02)
-
-
-def test_song_s_regressors_predict_the_rolling_container_ship() -> None:
-    """10/10 and random rudder predict 20/20 open loop, roll and loss of speed too."""
-    ship = shipgym.load_model("container")
-    angles = np.random.default_rng(0).uniform(-25.0, 25.0, 40)
-    commands = np.tile(ship.service_command, (8000, 1))
-    commands[:, 0] = np.radians(np.repeat(angles, 200))
-    runs = [zigzag(ship, 10, 10, port, duration=600, dt=0.1) for port in (False, True)]
-    runs.append(ship.simulate(commands, 0.1))
-    names = ("x", "y", "psi", "u", "v", "r", "p", "phi", "delta", "n")
-    seen = [
-        Trial(run.t[::5], {c: run[c][::5] for c in names}, name=f"{i}", kind=run.kind)
-        for i, run in enumerate([*runs, zigzag(ship, 20, 20, duration=600, dt=0.1)])
-    ]
-    measured = seen[-1].with_(use="validate")
-    fit = identify([*seen[:-1], measured], "mmg4dof", particulars=ship.particulars)
-    predicted = fit.predictions["3"]
-    assert fit.stable
-    assert predicted is not None
-    for channel, part in {
-        "u": 0.03,
-        "v": 0.02,
-        "r": 0.015,
-        "psi": 0.015,
-        "p": 0.02,
-        "phi": 0.02,
-    }.items():
-        error = np.sqrt(np.mean((predicted[channel] - measured[channel]) ** 2))
-        assert error < part * np.ptp(measured[channel]), channel
-    assert [len(fit.model.table.terms(q)) for q in "uvrp"] == [10, 16, 15, 14]
-    assert shipgym.check_ship_model(fit.model).ok
-    capsizing = replace(
-        fit.model, coefficients=fit.coefficients | {"d_f": -fit.coefficients["d_f"]}
-    )
-    assert any(
-        "heel" in problem for problem in shipgym.check_ship_model(capsizing).problems
-    )
-
-
-@pytest.mark.parametrize("name", ["nomoto2", "cubic"])
-def test_an_autopilot_can_be_trained_in_the_identified_model(name: str) -> None:
-    ship = ship_of(name, own(name))
-    env = gymnasium.make("shipgym/CourseKeeping-v0", model=ship)
-    env.reset(seed=0)
-    for _ in range(20):
-        observation, *_ = env.step(np.array([1.0], dtype=np.float32))
-    names = env.unwrapped.observation_names  # type: ignore[attr-defined]
-    assert observation[names.index("yaw_rate")] > 0.1
-    assert observation[names.index("surge")] == pytest.approx(1.0, abs=0.3)
-
-
 def test_a_registered_table_is_identified_by_its_name(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -359,13 +246,6 @@ def test_a_missing_shaft_speed_is_named() -> None:
 
 def test_full_third_order_holds_the_turn_of_an_unstable_ship() -> None:
     """The tanker, unstable on course: 0.3 deg of heading, 11 by the Mariner form."""
-    table = get_structure("abkowitz-full")
-    odd = {"v", "r", "delta"}
-    for q, parity in (("u", 0), ("v", 1), ("r", 1)):
-        powers = {tuple(sorted(term.powers)) for term in table.terms(q)}
-        assert len(powers) == {"u": 15, "v": 22, "r": 22}[q]
-        uneven = [p for p in powers if sum(n for s, n in p if s in odd) % 2 != parity]
-        assert sorted(uneven) == ([] if q == "u" else [(), (("du", 1),), (("du", 2),)])
     ship = shipgym.load_model("tanker")
     travel = ship.particulars["length"] / ship.particulars["speed"]
     runs = [

@@ -36,28 +36,6 @@ def test_with_the_printed_c_come_the_printed_coefficients_of_surge_and_yaw():
             assert row.as_paper == pytest.approx(row.printed, rel=within)
 
 
-@pytest.mark.parametrize(("equation", "agree", "exact"), [("v", 22, 3), ("r", 16, 12)])
-def test_as_the_source_integrates_the_ship_its_coefficients_come_out(
-    equation, agree, exact
-):
-    """Tables 7.4.9 and 7.4.10."""
-    case = f"Table {steering_forms.TABLES[equation]}"
-    rows = [
-        row for row in steering_forms.coefficient_rows() if row.case.startswith(case)
-    ]
-    for basis, count in (("computed", agree), ("counted elsewhere", exact)):
-        compared = [row.agrees for row in rows if row.basis == basis]
-        assert len(compared) == 40
-        assert sum(compared) == count
-    rest = list(steering_forms.agreement_rows())[-1]
-    assert rest.as_paper == pytest.approx(7.0, abs=1.0)
-
-
-def test_a_bound_that_was_picked_is_not_counted_as_agreement():
-    picked = [row for row in container_ship.weight_rows() if row.basis == "picked"]
-    assert len(picked) == 6
-
-
 def test_every_prediction_of_table_744_is_better_than_the_best_printed():
     rows = [row for row in container_ship.prediction_rows() if row.best is not None]
     assert len(rows) == 9
@@ -108,15 +86,6 @@ def test_the_samples_that_suffice_the_thesis_suffice(equation):
     )
 
 
-def test_settling_is_read_off_a_curve():
-    curve = np.ones((len(sample_counts.COUNTS), 2))
-    curve[7, 1] = 1.2
-    assert sample_counts.settled_from(curve) == sample_counts.COUNTS[8]
-    assert sample_counts.enough(curve[:, 1], 1.1) == sample_counts.COUNTS[8]
-    assert sample_counts.enough(curve[:, 1], 0.5) is None
-    assert sample_counts.settled_from(np.ones_like(curve)) == sample_counts.COUNTS[0]
-
-
 def test_outliers_bias_least_squares_and_ls_svr_alike_and_the_weighted_form_little():
     errors = {
         method: response_models.mean_error(
@@ -126,17 +95,6 @@ def test_outliers_bias_least_squares_and_ls_svr_alike_and_the_weighted_form_litt
     }
     assert errors["LS"] == pytest.approx(errors["LS-SVR"], rel=0.1)
     assert errors["best"] < 0.25 * errors["LS"]
-
-
-def test_a_clean_log_gives_the_stand_in_back():
-    form = response_models.Form(response_models.K, response_models.T)
-    assert form.steady == pytest.approx(20.0 * response_models.K)
-    assert response_models.Form(0.2, 1.0, a=2.0).steady < 4.0
-    truth = response_models.log(response_models.ASSESSED, 0)
-    noise = np.hypot(response_models.NOISE["noise"], response_models.NOISE["drift"])
-    assert np.std(response_models.residuals(form, truth)) == pytest.approx(
-        noise, rel=0.3
-    )
 
 
 def test_all_six_of_the_mariner_come_within_five_per_cent():
