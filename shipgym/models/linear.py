@@ -70,29 +70,28 @@ class Nomoto:
         return self.K / self.T
 
 
-def straight_running(model: ShipModel, speed: float | None = None) -> StraightRunning:
+def straight_running(model: ShipModel) -> StraightRunning:
     """Speed, drift and neutral rudder at which a ship runs straight.
 
     A single-screw ship needs a little rudder to run straight (Mariner 1.1 degrees to
     port). Where the model's surge equation has no steady speed near service speed, that
-    of service is kept; so is `speed`, m/s, where given, with the shaft as at service
-    speed: a ship that has lost speed in a turn or in weather. Raises InputError if the
-    model has no straight course within physical drift and rudder angles.
+    of service is kept. Raises InputError if the model has no straight course within
+    physical drift and rudder angles.
     """
     service = model.particulars["speed"]
     unknowns = [name for name in BALANCED_BY if name in model.state_names]
     found = None
-    if speed is None and _feels_speed(model):
+    if _feels_speed(model):
         found = _balance(model, unknowns)
     # where surge is not to be believed, the speed is kept
     if found is None or not 0.75 < found["u"] / service < 1.25:
         kept = [name for name in unknowns if name != "u"]
-        found = _balance(model, kept, speed)
+        found = _balance(model, kept)
     if found is None:
         most_deg = np.degrees(LARGEST_RUDDER)
         raise InputError(
             f"model {model.name!r}: expected a straight course with less than"
-            f" {most_deg:.0f} deg of rudder at {speed or service:g} m/s, got none;"
+            f" {most_deg:.0f} deg of rudder at {service:g} m/s, got none;"
             " identify it from trials that turn to both sides, or check the sign of the"
             " rudder"
         )
@@ -106,28 +105,6 @@ def straight_running(model: ShipModel, speed: float | None = None) -> StraightRu
     )
 
 
-def steady_turn_rudder(
-    model: ShipModel, rate: float, slowed: bool = True
-) -> float | None:
-    """Rudder angle, rad, of the steady turn at a yaw rate, rad/s; None if not found.
-
-    `slowed`: whether the ship loses speed as her surge equation has it, or keeps that
-    of service.
-    """
-    unknowns = [name for name in BALANCED_BY if name in model.state_names]
-    if not slowed:
-        unknowns.remove("u")
-    found = _balance(
-        model,
-        unknowns,
-        rate=rate,
-        largest_sway=1.0,
-    )
-    if found is None or found["u"] <= 0.0:
-        return None
-    return found["delta"]
-
-
 def _feels_speed(model: ShipModel) -> bool:
     """True where surge depends on the speed, so that there is a steady one."""
     service = dict(zip(model.state_names, model.service_state.tolist(), strict=True))
@@ -135,24 +112,11 @@ def _feels_speed(model: ShipModel) -> bool:
     return _prime_rates(model, slower)["u"] != _prime_rates(model, service)["u"]
 
 
-def _balance(
-    model: ShipModel,
-    unknowns: list[str],
-    speed: float | None = None,
-    rate: float = 0.0,
-    largest_sway: float = 0.5,
-) -> dict[str, float] | None:
-    """State without accelerations at a yaw rate, found from a speed; SI units.
-
-    `largest_sway`: over service speed; a state in a turn may have more rudder than
-    straight running.
-    """
+def _balance(model: ShipModel, unknowns: list[str]) -> dict[str, float] | None:
+    """State without accelerations and yaw rate, SI units; None where there is none."""
     from scipy.optimize import root
 
     first = dict(zip(model.state_names, model.service_state.tolist(), strict=True))
-    first["r"] = rate
-    if speed is not None:
-        first["u"] = speed
     units = _units(model)
 
     def state_with(deviations: Floats) -> dict[str, float]:
@@ -167,9 +131,8 @@ def _balance(
     state = state_with(solution)
     if not np.all(np.abs(imbalance(solution)) < 1e-8):
         return None
-    if abs(state["v"]) >= largest_sway * model.particulars["speed"]:
-        return None
-    if rate == 0.0 and abs(state["delta"]) >= LARGEST_RUDDER:
+    drifts = abs(state["v"]) >= 0.5 * model.particulars["speed"]
+    if drifts or abs(state["delta"]) >= LARGEST_RUDDER:
         return None
     return state
 
@@ -273,15 +236,12 @@ def _block(
     return matrix
 
 
-def steering_state_space(
-    model: ShipModel, speed: float | None = None
-) -> tuple[Floats, Floats]:
+def steering_state_space(model: ShipModel) -> tuple[Floats, Floats]:
     """Linear steering dynamics about straight running: A and B of `linearise`.
 
-    Speed in m/s, the service speed by default. Raises InputError if the model has no
-    straight course.
+    Raises InputError if the model has no straight course.
     """
-    return linearise(model, straight_running(model, speed))
+    return linearise(model, straight_running(model))
 
 
 def nomoto_of(A: Floats, B: Floats) -> Nomoto:

@@ -16,7 +16,6 @@ from shipgym.models.linear import (
     linearise,
     nomoto,
     nomoto_of,
-    steady_turn_rudder,
     steering_state_space,
     straight_running,
 )
@@ -145,17 +144,6 @@ def test_a_model_without_straight_course_is_refused_by_name():
         match=r"model 'mariner': expected a straight course with less than 20 deg",
     ):
         straight_running(with_coefficients(N_0=0.01))
-
-
-@pytest.mark.parametrize("degrees", [-20.0, 10.0, 30.0])
-def test_rudder_of_a_steady_turn_is_that_which_turns_her_so(degrees):
-    commands = np.tile(MARINER.service_command, (4000, 1))
-    commands[:, 0] = np.radians(degrees)
-    turn = MARINER.simulate(commands, 0.5)
-    assert turn["r"][-1] == pytest.approx(turn["r"][-200], rel=1e-6)
-    assert steady_turn_rudder(MARINER, turn["r"][-1]) == pytest.approx(
-        np.radians(degrees), rel=1e-4
-    )
 
 
 def test_a_rudder_without_effect_has_no_nomoto_form():
