@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy.signal import correlate
 
 from identification.arrays import by_name, column_rms, root_mean_square
 from identification.estimators.covariance import residuals
@@ -141,26 +140,6 @@ def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
         product = float(later @ earlier)
         correlations.append(product / power)
     return tuple(correlations)
-
-
-def cross_correlation(first: Floats, second: Floats, lags: Integers) -> Floats:
-    """Correlation of one series with another at the same times that is shifted.
-
-    Lags are samples by which the first comes after the second. 0 for a constant or
-    shorter series. Shape (n_lags,).
-    """
-    a = first - first.mean()
-    b = second - second.mean()
-    powers = (a @ a) * (b @ b)
-    size = float(np.sqrt(powers)) or 1.0  # 0 for a constant one
-    products = correlate(a, b, method="fft")
-    by_lag = products / size
-
-    no_lag = len(a) - 1
-    found = by_lag.take(no_lag + lags, mode="clip")
-    too_far = np.abs(lags) > no_lag
-    found[too_far] = 0.0
-    return np.asarray(found)
 
 
 def correlation_matrix(scaled: Floats) -> Floats:

@@ -13,7 +13,6 @@ from identification.judging.sentences import (
     turn_sentences,
 )
 from identification.judging.warnings import (
-    EQUATIONS,
     exactly_collinear,
     undetermined,
 )
@@ -32,7 +31,6 @@ def summary_table(fit: Fit) -> str:
         _headline(fit),
         kernel_text(kernel) if kernel else coefficients_table(fit),
         _inertia(fit),
-        _equations(fit),
     ]
     posterior = provenance.get("posterior")
     error = provenance.get("model_error")
@@ -178,30 +176,6 @@ def _add_gear(table: Table, model: ShipModel) -> None:
     ]
     for name, value, unit in rows:
         table.add_row(name, f"{value:.4g}", unit, source)
-
-
-def _equations(fit: Fit) -> Table:
-    table = lined_table(
-        "Fit of the equations",
-        "equation",
-        ">rows",
-        ">terms",
-        ">rank",
-        ">condition",
-        ">R2",
-        ">residual rms",
-    )
-    for name, equation in fit.diagnostics.items():
-        table.add_row(
-            EQUATIONS.get(name, name),
-            str(equation.samples),
-            str(equation.terms),
-            str(equation.rank),
-            f"{equation.condition_number:.0f}",
-            f"{equation.r_squared:.5f}",
-            f"{equation.residual_rms:.2e}",
-        )
-    return table
 
 
 def _against_reference(fit: Fit) -> Table:

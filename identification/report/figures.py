@@ -1,37 +1,20 @@
-"""Figures of a regression: accelerations measured and explained, and the residuals."""
+"""Figures of an identification: the regression, its residuals, rank, and the trials."""
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from identification.estimators.covariance import residuals
-from identification.judging.diagnostics import (
-    autocorrelation,
-    cross_correlation,
-    without_overlap,
-)
+from identification.estimators.lssvm import TruncatedLSSVM
+from identification.judging.diagnostics import autocorrelation, without_overlap
 from identification.judging.fit import Fit
 from identification.judging.warnings import EQUATIONS
-from identification.report.choice_figures import (
-    l_curve_figure,
-    search_figure,
-    truncated,
-)
-from identification.report.coefficient_figure import coefficients_figure
 from identification.report.predictions import overview_figure, prediction_figure
 from shipgym.arrays import Floats, Integers
 from shipgym.manoeuvres.quantiles import NORMAL_95
-from shipgym.plots import (
-    Panel,
-    axis,
-    compact,
-    graph_objects,
-    line,
-    panels,
-    points,
-    translucent,
-)
+from shipgym.plots import Panel, axis, compact, graph_objects, line, panels, points
 from shipgym.plots.style import LIMIT, MEASURED, MODEL, MUTED, Figure
 
 UNITS = {"u": "m/s²", "v": "m/s²", "r": "deg/s²", "p": "deg/s²"}
@@ -45,12 +28,10 @@ def plots(fit: Fit) -> dict[str, Figure]:
     Returns
     -------
     dict of str to plotly.graph_objects.Figure
-        "fit", "residuals" (autocorrelation, and cross-correlation with the rudder),
-        "l-curve" for the method that has one, "coefficients", "trials", and
-        "prediction: NAME" for each trial held out.
+        "fit", "residuals" (autocorrelation), "l-curve" for the method that has one,
+        "trials", and "prediction: NAME" for each trial held out.
     """
     found = regression_figures(fit)
-    found["coefficients"] = coefficients_figure(fit)
     fitted = [trial for trial in fit.trials if trial.use == "fit"]
     overview = overview_figure(fitted, fit.predictions)
     if overview is not None:
@@ -64,16 +45,11 @@ def plots(fit: Fit) -> dict[str, Figure]:
 
 
 def regression_figures(fit: Fit) -> dict[str, Figure]:
-    """Figures of the regression by name.
-
-    "l-curve" and "search" only where a method has one.
-    """
+    """Figures of the regression by name; "l-curve" only where a rank was chosen."""
     found = {"fit": fit_figure(fit), "residuals": residual_figure(fit)}
-    curves = truncated(fit)
+    curves = with_a_rank(fit)
     if curves:
         found["l-curve"] = l_curve_figure(curves)
-    if fit.searches:
-        found["search"] = search_figure(fit.searches)
     return found
 
 
@@ -90,27 +66,20 @@ def fit_figure(fit: Fit) -> Figure:
     most_rows = 2500  # drawn of one equation
     every = max(len(samples) // most_rows, 1)
     drawn = slice(None, None, every)
-    trial = samples.trial[drawn]
-    breaks = np.flatnonzero(np.diff(trial)) + 1
+    breaks = np.flatnonzero(np.diff(samples.trial[drawn])) + 1
     shown = []
     for q in fit.estimators:
-        accelerations = mean_accelerations(fit, q, drawn)
-        title = f"{EQUATIONS[q]}, {UNITS[q]}"
-        shown.append(_history_panel(accelerations, breaks, title))
-        shown.append(_cloud_panel(accelerations))
-    grid = {
-        "column_widths": [0.7, 0.3],
-        "horizontal_spacing": 0.1,
-        "vertical_spacing": 0.48 / len(shown),
-    }
-    return panels(
-        shown,
-        height=95 * len(shown) + 80,
-        columns=2,
-        outer=True,
-        grid=grid,
-        hovermode="closest",
-    )
+        found = mean_accelerations(fit, q, drawn)
+        measured = np.insert(found.measured, breaks, np.nan)  # gaps between the trials
+        explained = np.insert(found.explained, breaks, np.nan)
+        windows = np.arange(len(measured))
+        lines = [
+            line(windows, measured, "trials", MEASURED, 1.2),
+            line(windows, explained, "regression", MODEL, 1.7),
+        ]
+        title = axis(f"{EQUATIONS[q]}, {UNITS[q]}", nticks=5)
+        shown.append(Panel(lines, "window, trial after trial", title))
+    return panels(shown, 190 * len(shown) + 80, 1, outer=True, hovermode="closest")
 
 
 def mean_accelerations(fit: Fit, q: str, rows: slice) -> WindowAccelerations:
@@ -126,82 +95,22 @@ def mean_accelerations(fit: Fit, q: str, rows: slice) -> WindowAccelerations:
     )
 
 
-def _history_panel(found: WindowAccelerations, breaks: Integers, title: str) -> Panel:
-    """Accelerations window after window, with gaps between the trials."""
-    measured = np.insert(found.measured, breaks, np.nan)
-    explained = np.insert(found.explained, breaks, np.nan)
-    windows = np.arange(len(measured))
-    lines = [
-        line(windows, measured, "trials", MEASURED, 1.2),
-        line(windows, explained, "regression", MODEL, 1.7),
-    ]
-    return Panel(
-        lines,
-        x="window, trial after trial",
-        y=axis(title, nticks=5),
-    )
-
-
-def _cloud_panel(found: WindowAccelerations) -> Panel:
-    """Measured over explained accelerations, with the line of equality."""
-    both = np.concatenate(found)
-    ends = [both.min(), both.max()]
-    cloud = points(
-        found.explained,
-        found.measured,
-        "",
-        translucent(MODEL, 0.35),
-        4,
-        showlegend=False,
-        hoverinfo="skip",
-    )
-    equal = line(ends, ends, "equal", MUTED, 1.0, showlegend=False)
-    return Panel([cloud, equal], axis("regression", nticks=4), axis(nticks=5))
-
-
 def residual_figure(fit: Fit) -> Figure:
-    """Autocorrelation of the residuals and their cross-correlation with the rudder.
-
-    With 95 % bounds of white noise.
-    """
-    errors = residuals(fit.estimators, fit.samples)
+    """Autocorrelation of the residuals, with 95 % bounds of white noise."""
     rows = without_overlap(fit.samples)
-    rudder = rudder_at_windows(fit)
     bound = NORMAL_95 / np.sqrt(len(rows))
     most = 24  # windows
-    lags = np.arange(-most, most + 1)
-
     shown = []
-    own_title, rudder_title = "with themselves", "with the rudder"
-    for q, error in errors.items():
+    for q, error in residuals(fit.estimators, fit.samples).items():
         own = autocorrelation(error[rows], most)
-        after = np.arange(1, len(own) + 1)
-        panel = _bars_panel(after, own, bound, EQUATIONS[q], own_title)
-        shown.append(panel)
-        if rudder is not None:
-            found = cross_correlation(error[rows], rudder[rows], lags)
-            panel = _bars_panel(lags, found, bound, "", rudder_title)
-            shown.append(panel)
-        own_title = rudder_title = ""  # above the first row only
-
-    count = len(errors)
+        lags = np.arange(1, len(own) + 1)
+        shown.append(_bars_panel(lags, own, bound, EQUATIONS[q]))
     return panels(
-        shown,
-        height=170 * count + 100,
-        columns=1 if rudder is None else 2,
-        outer=True,
-        grid={
-            "horizontal_spacing": 0.1,
-            "vertical_spacing": 0.24 / count,
-        },
-        hovermode="closest",
-        bargap=0.5,
+        shown, 170 * len(shown) + 100, 1, outer=True, hovermode="closest", bargap=0.5
     )
 
 
-def _bars_panel(
-    lags: Integers, values: ArrayLike, bound: float, beside: str, title: str
-) -> Panel:
+def _bars_panel(lags: Integers, values: ArrayLike, bound: float, beside: str) -> Panel:
     """Correlations by their lags, with the bounds of white noise."""
     bars = graph_objects().Bar(
         x=lags,
@@ -218,19 +127,77 @@ def _bars_panel(
 
     largest = float(np.max(np.abs(values), initial=0.0))
     reach = min(max(1.1 * largest, 3.0 * bound), 1.05)
-    return Panel(traces, "lag, windows", axis(beside, range=[-reach, reach]), title)
+    return Panel(traces, "lag, windows", axis(beside, range=[-reach, reach]))
 
 
-def rudder_at_windows(fit: Fit) -> Floats | None:
-    """Rudder in the middle of each row's window, rad; None where a trial has none."""
-    samples = fit.samples
-    used = [trial for trial in fit.trials if trial.use == "fit"]
-    middle = samples.start + 0.5 * samples.duration
-    angles = np.empty(len(samples))
-    for index, trial in enumerate(used):
-        if "delta" not in trial:
-            return None
-        rows = samples.trial == index
-        times = middle[rows]
-        angles[rows] = np.interp(times, trial.t, trial["delta"])
-    return angles
+def with_a_rank(fit: Fit) -> dict[str, TruncatedLSSVM]:
+    """The estimators, by equation, that chose or were given a rank."""
+    found = {}
+    for q, estimator in fit.estimators.items():
+        if not isinstance(estimator, TruncatedLSSVM):
+            continue
+        full = estimator.selection == "full" and estimator.rank is None
+        if not full:
+            found[q] = estimator
+    return found
+
+
+def l_curve_figure(estimators: Mapping[str, TruncatedLSSVM]) -> Figure:
+    """Size of residuals and of solution for every rank, one panel for each equation."""
+    shown = [_l_curve_panel(q, estimator) for q, estimator in estimators.items()]
+    return panels(
+        shown,
+        360,
+        len(shown),
+        outer=True,
+        grid={"horizontal_spacing": 0.09},
+        left=70,
+        hovermode="closest",
+    )
+
+
+def _l_curve_panel(q: str, estimator: TruncatedLSSVM) -> Panel:
+    curve, rank = estimator.l_curve_, estimator.rank_
+    x = compact(curve.residual_norm)
+    y = compact(curve.solution_norm)
+    ranks = [str(k) for k in range(1, len(x) + 1)]
+    all_ranks = line(
+        x,
+        y,
+        "rank 1, 2, ...",
+        MUTED,
+        1.2,
+        "lines+markers",
+        marker={"color": MUTED, "size": 5},
+        text=ranks,
+        hovertemplate="rank %{text}<extra></extra>",
+    )
+    own = slice(rank - 1, rank)
+    chosen = points(
+        x[own],
+        y[own],
+        "chosen",
+        LIMIT,
+        9,
+        hoverinfo="skip",
+        cliponaxis=False,
+    )
+    return Panel(
+        [all_ranks, chosen],
+        _logarithmic("norm of the residuals", x),
+        _logarithmic("norm of the solution", y),
+        f"{EQUATIONS[q]}: rank {rank} of {len(x)}",
+    )
+
+
+def _logarithmic(title: str, values: NDArray[np.float32]) -> dict[str, Any]:
+    """An axis in decades, or in steps of 1, 2, 5 where there are few."""
+    positive = np.finfo(np.float32).tiny
+    smallest = max(values.min(), positive)
+    few_decades = values.max() < 100.0 * smallest
+    return axis(
+        title,
+        type="log",
+        dtick="D2" if few_decades else 1,
+        tickformat="~g",
+    )

@@ -7,7 +7,6 @@ from typing import Any
 
 from identification.judging.fit import Fit
 from identification.judging.warnings import why_unstable
-from identification.report.coefficient_figure import coefficients_figure
 from identification.report.figures import regression_figures
 from identification.report.view import fit_view, trial_figures
 from shipgym.files import write_text
@@ -23,7 +22,6 @@ def report_page(fit: Fit) -> str:
     instability = why_unstable(fit)
     figures: dict[str, Any] = {"regression": regression_figures(fit)}
     if instability is None:
-        figures["coefficients"] = coefficients_figure(fit)
         figures |= trial_figures(fit)
     return render(
         "identification.report/report.html",

@@ -58,15 +58,6 @@ class TrialRow:
 
 
 @dataclass(frozen=True)
-class ParticularRow:
-    """A particular of the ship."""
-
-    name: str
-    estimated: bool
-    value: str  # with its unit
-
-
-@dataclass(frozen=True)
 class CoefficientRow:
     """A coefficient with its standard error."""
 
@@ -75,17 +66,6 @@ class CoefficientRow:
     error: str
     t: float | None  # value by its error; None without one
     significant: bool
-
-
-@dataclass(frozen=True)
-class ErrorRow:
-    """Errors of the prediction of a trial."""
-
-    name: str
-    use: str
-    diverged: bool
-    indices: list[str]  # measured and predicted, a line each
-    rmse: Mapping[str, float | None]  # by channel, SI
 
 
 def short_names(trials: Sequence[Trial]) -> dict[str, str]:
@@ -129,49 +109,28 @@ def trial_row(trial: Trial, name: str) -> TrialRow:
     )
 
 
-def particulars(model: ShipModel) -> list[ParticularRow]:
-    """Particulars of the ship that are known."""
-    ship = model.particulars
+def quantities(model: ShipModel) -> list[tuple[str, str, str]]:
+    """Particulars, added masses and steering gear: name, where from, and value."""
+    ship, gear = model.particulars, model.steering
     rows = []
+
+    def add(name: str, value: str, estimated: bool) -> None:
+        rows.append((name, "estimated" if estimated else "given", value))
+
     for name, (words, unit, factor) in PARTICULARS.items():
         value = ship[name]
-        if value is None:
-            continue
-        digits = f"{factor * value:.5g}".replace("-", MINUS)
-        row = ParticularRow(
-            name=words,
-            estimated=name in ship.estimated,
-            value=f"{digits} {unit}",
-        )
-        rows.append(row)
-    return rows
-
-
-def added_masses(model: ShipModel) -> list[ParticularRow]:
-    """Added masses that are known, in the prime system times 1e-5."""
-    ship = model.particulars
-    rows = []
+        if value is not None:
+            digits = f"{factor * value:.5g}".replace("-", MINUS)
+            add(words, f"{digits} {unit}", name in ship.estimated)
     for name in ADDED_MASSES:
         value = ship[name]
-        if value is None:
-            continue
-        row = ParticularRow(
-            name=name,
-            estimated=name in ship.estimated,
-            value=fixed(value / PRIME, 1),
-        )
-        rows.append(row)
+        if value is not None:
+            add(f"{name}, 10⁻⁵", fixed(value / PRIME, 1), name in ship.estimated)
+    estimated = (model.provenance or {}).get("steering") == "estimated"
+    add("rudder limit", f"{number(gear.rudder_limit_deg)} deg", estimated)
+    add("rudder rate", f"{number(gear.rudder_rate_deg_s)} deg/s", estimated)
+    add("rudder lag", f"{number(gear.time_constant, 2)} s", estimated)
     return rows
-
-
-def steering_gear(model: ShipModel) -> dict[str, str]:
-    """Values of the steering gear by name."""
-    gear = model.steering
-    return {
-        "rudder limit": f"{number(gear.rudder_limit_deg)} deg",
-        "rudder rate": f"{number(gear.rudder_rate_deg_s)} deg/s",
-        "rudder lag": f"{number(gear.time_constant, 2)} s",
-    }
 
 
 def coefficient_tables(fit: Fit) -> dict[str, list[CoefficientRow]]:
@@ -218,21 +177,6 @@ def _coefficient_row(
     )
 
 
-def error_rows(fit: Fit, short: Mapping[str, str]) -> list[ErrorRow]:
-    """Errors of the predictions of all trials, by their short names."""
-    rows = []
-    for name, metrics in fit.metrics["trials"].items():
-        row = ErrorRow(
-            name=short[name],
-            use=metrics["use"],
-            diverged=metrics["diverged"],
-            indices=index_lines(metrics),
-            rmse=metrics["rmse"],
-        )
-        rows.append(row)
-    return rows
-
-
 def index_lines(metrics: Mapping[str, Any]) -> list[str]:
     """The manoeuvre's indices, measured and predicted; a dash where it has none."""
     lines = []
@@ -250,19 +194,3 @@ def index_lines(metrics: Mapping[str, Any]) -> list[str]:
             line += f" ({in_loop})"
         lines.append(f"{line} {unit}")
     return lines or [NONE]
-
-
-def reference_rows(
-    fit: Fit, short: Mapping[str, str]
-) -> list[tuple[str, float | None, float | None]]:
-    """Trials, with heading errors, rad, of a grey box and of its bare reference."""
-    reference = fit.metrics.get("reference")
-    if reference is None:
-        return []
-    bare = reference["trials"]
-    rows = []
-    for name, metrics in fit.metrics["trials"].items():
-        own_error = metrics["rmse"]["psi"]
-        bare_error = bare[name]["rmse"]["psi"]
-        rows.append((short[name], own_error, bare_error))
-    return rows

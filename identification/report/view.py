@@ -33,16 +33,11 @@ from identification.report.predictions import (
 )
 from identification.report.tables import (
     CoefficientRow,
-    ErrorRow,
-    ParticularRow,
     TrialRow,
-    added_masses,
     coefficient_tables,
-    error_rows,
-    particulars,
-    reference_rows,
+    index_lines,
+    quantities,
     short_names,
-    steering_gear,
     trial_row,
 )
 from shipgym.pages import NONE, fixed, number
@@ -81,17 +76,14 @@ class FitView:
     undetermined: list[str]  # terms that the data cannot separate
     trials: list[TrialRow]
     equations: dict[str, EquationDiagnostics]  # by their names in words
-    particulars: list[ParticularRow]
-    added_masses: list[ParticularRow]
-    gear: dict[str, str]
-    gear_source: str  # "given" or "estimated"
+    #: particulars, added masses and steering gear: name, where from, and value
+    quantities: list[tuple[str, str, str]]
     estimated: str  # names of the particulars that were estimated; empty without any
     coefficients: dict[str, list[CoefficientRow]]  # by the title of their table
     coefficient_notes: str
     kernel: str | None
-    errors: list[ErrorRow]
-    reference: str | None  # name of the reference ship of a grey box
-    reference_rows: list[tuple[str, float | None, float | None]]
+    #: metrics of the predictions by short name, and the manoeuvres' indices in words
+    errors: dict[str, tuple[dict[str, Any], list[str]]]
 
 
 def fit_view(fit: Fit) -> FitView:
@@ -101,7 +93,6 @@ def fit_view(fit: Fit) -> FitView:
     short = short_names(fit.trials)
     coefficients = coefficient_tables(fit)
     kernel = provenance.get("kernel")
-    reference = fit.metrics.get("reference", {})
     equations = {
         EQUATIONS.get(name, name): equation
         for name, equation in fit.diagnostics.items()
@@ -122,17 +113,15 @@ def fit_view(fit: Fit) -> FitView:
         undetermined=undetermined(fit),
         trials=[trial_row(trial, short[trial.name]) for trial in fit.trials],
         equations=equations,
-        particulars=particulars(model),
-        added_masses=added_masses(model),
-        gear=steering_gear(model),
-        gear_source=provenance.get("steering", "given"),
+        quantities=quantities(model),
         estimated=", ".join(sorted(model.particulars.estimated, key=str.lower)),
         coefficients=coefficients,
         coefficient_notes=_coefficient_notes(fit, coefficients),
         kernel=kernel_text(kernel) if kernel else None,
-        errors=error_rows(fit, short),
-        reference=reference.get("name"),
-        reference_rows=reference_rows(fit, short),
+        errors={
+            short[name]: (metrics, index_lines(metrics))
+            for name, metrics in fit.metrics["trials"].items()
+        },
     )
 
 
