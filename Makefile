@@ -57,7 +57,6 @@ evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/reproduce.py all --markdown docs/reproduction.md --images docs/images || test $$? = 1  # 1: aims missed, as the page says
 	test ! -d $(DATA) || $(BIN)/python scripts/predict_real_ships.py --data $(DATA)
 	$(BIN)/shipgym benchmark --controllers lq,tuned-ilos,wheel-over,tuned-wheel-over,mpc,ppo --out build/suite
-	$(BIN)/python scripts/train_pretrained.py --table build/suite
 	$(BIN)/python scripts/certainty.py --out build/certainty.jsonl
 	$(BIN)/python scripts/certainty.py --out build/certainty.jsonl --new
 	$(BIN)/python scripts/autopilots.py --rows build/autopilots.jsonl

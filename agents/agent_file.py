@@ -25,7 +25,7 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
     Parameters
     ----------
     path : str or Path
-        A file, or the name of a pretrained agent, `sharp-turns-ppo-s0`
+        A file, or the name of a pretrained agent, `path-following-ppo`
         (`list_pretrained`).
     model : ShipModel, optional
         The ship to steer; one with other observation scales is refused.

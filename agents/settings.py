@@ -2,10 +2,31 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 from shipgym.checks import check_choice, check_keys, check_number, check_whole
 from shipgym.errors import InputError
+
+
+class Step(NamedTuple):
+    """How a search varies a setting of a controller.
+
+    Attributes
+    ----------
+    size : float
+        Change for a step of 1: in the setting's logarithm, or in the setting.
+    start : float, optional
+        Where the search begins, if not at the design: a small value in place of 0.
+    reach : float
+        Largest factor either way.
+    is_factor : bool
+        True to search the logarithm.
+    """
+
+    size: float
+    start: float | None = None
+    reach: float = 100.0
+    is_factor: bool = True
 
 
 def setting(

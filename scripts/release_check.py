@@ -99,7 +99,7 @@ TRIED: dict[str, tuple[str | tuple[str, ...], ...]] = {
     "onnx": (
         (
             "export",
-            str(ROOT / "agents/pretrained/sharp-turns-ppo-s0.json"),
+            str(ROOT / "agents/pretrained/path-following-ppo.json"),
             "--onnx",
             "agent.onnx",
         ),

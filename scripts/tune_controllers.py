@@ -32,7 +32,7 @@ from agents.training.controller_search import (
     tune_controller,
     unseen_episodes,
 )
-from agents.training.controller_space import lq_space
+from agents.training.controller_space import search_space
 from shipgym.files import write_json
 
 CONTROLLERS = ("lq", "ilos", "wheel-over", "preview-lq", "mpc")
@@ -113,7 +113,7 @@ def led_by_rule(task: BenchmarkTask, found: dict[str, Any]) -> FoundSettings:
         "reach_lengths": effective_lead(rule),
         "crab_share": rule["crab_share"],
     }
-    for setting in lq_space(task):
+    for setting in search_space("lq", task):
         name = INNER + setting.name
         settings[name] = rule[name]
     candidates: list[dict[str, float]] = [{}, settings]

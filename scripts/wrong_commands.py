@@ -27,7 +27,7 @@ from agents.cli import app
 
 ROOT = Path(__file__).resolve().parents[1]
 SHIP = str(ROOT / "examples" / "mariner" / "ship.toml")
-AGENT = str(ROOT / "agents" / "pretrained" / "sharp-turns-ppo-s0.json")
+AGENT = str(ROOT / "agents" / "pretrained" / "path-following-ppo.json")
 LONGEST_S = 60  # that a wrong command may take
 
 #: The shortest right command line of each command; the folder that it is in is new.

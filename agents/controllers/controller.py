@@ -35,6 +35,7 @@ from agents.controllers.memory import (
     size_of,
     to_rows,
 )
+from agents.settings import Settings
 from shipgym import ShipModel
 from shipgym.arrays import Flags, Floats, finite
 from shipgym.engine.records import Record, leaves
@@ -91,6 +92,8 @@ class Controller:
     """
 
     kind: ClassVar[str] = ""
+    #: Settings of `from_model`, where a search may vary them.
+    settings_type: ClassVar[type[Settings] | None] = None
     #: For each gain the signal it acts on and the sign with which it does.
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = {}
     #: Names of its gains, where they are not those of `feedback`.

@@ -33,6 +33,7 @@ from agents.controllers.memory import (
     on_course,
     recalled,
 )
+from agents.settings import Step, setting
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
 from shipgym.tasks.scales import OBSERVATION_NAMES
@@ -270,6 +271,22 @@ class Guided(Controller):
         raise InputError(
             f"autopilot: expected a controller of shipgym for {purpose}, got {name}"
         )
+
+
+def lookahead_setting() -> Any:
+    """Setting of all guidance."""
+    return setting(
+        "lookahead, ship lengths; by default that of the task. Longer turns gentler,"
+        " shorter comes back sooner",
+        None,
+        above=0.0,
+        search=Step(0.5),
+    )
+
+
+def own_lookahead(lengths: float | None, task: Task) -> float:
+    """Lookahead, ship lengths, by default that of a task."""
+    return task.lookahead if lengths is None else lengths
 
 
 def with_path(task: Task | None) -> Task:

@@ -6,18 +6,23 @@ IEEE Conference on Decision and Control.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from agents.controllers.controller import ANY_NUMBER, Bounds
-from agents.controllers.guided import Guided, with_path
+from agents.controllers.guided import (
+    Guided,
+    lookahead_setting,
+    own_lookahead,
+    with_path,
+)
 from agents.controllers.interface import Policy
 from agents.controllers.law import Law, Number, PathSignals
+from agents.settings import Settings, Step, setting
 from shipgym import ShipModel
-from shipgym.checks import check_number
 from shipgym.engine.records import Record
 from shipgym.models.by_name import takes_name
 from shipgym.tasks.task import Task
@@ -54,6 +59,30 @@ def integral_line_of_sight(
     return course, DriftMemory(drift)
 
 
+@dataclass(frozen=True)
+class LineOfSightSettings(Settings):
+    """Settings of integral line of sight."""
+
+    lookahead_lengths: float | None = lookahead_setting()
+    integral_lengths: float | None = setting(
+        "time over which a steady cross-track error is integrated to as much again, in"
+        " times to travel one ship length; by default 4 times `lookahead_lengths`, with"
+        " which the way back to the path is critically damped; less swings, more is"
+        " slower",
+        None,
+        above=0.0,
+        search=Step(0.5),
+    )
+
+    def completed(self, model: ShipModel, task: Task) -> Self:
+        """Fill in what follows from a task."""
+        lookahead = own_lookahead(self.lookahead_lengths, task)
+        integral = self.integral_lengths
+        if integral is None:
+            integral = CRITICAL * lookahead
+        return replace(self, lookahead_lengths=lookahead, integral_lengths=integral)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IntegralLineOfSight(Guided):
     """Line of sight with an integral of the cross-track error.
@@ -62,6 +91,7 @@ class IntegralLineOfSight(Guided):
     """
 
     kind: ClassVar[str] = "ilos"
+    settings_type: ClassVar[type[Settings]] = LineOfSightSettings
     law: ClassVar[Law] = staticmethod(integral_line_of_sight)
     memory_record: ClassVar[Record] = DriftMemory
     gain_names: ClassVar[tuple[str, ...]] = (*Guided.gain_names, "integral")
@@ -78,13 +108,12 @@ class IntegralLineOfSight(Guided):
         *,
         autopilot: Policy | None = None,
         task: Task | None = None,
-        lookahead_lengths: float | None = None,
-        integral_lengths: float | None = None,
+        **settings: float | None,
     ) -> Self:
         """Lead an autopilot along the paths of a task.
 
-        Raises InputError if an argument is out of its range or the autopilot was
-        designed for another ship.
+        Raises InputError if a setting is out of its range or the autopilot was designed
+        for another ship.
 
         Parameters
         ----------
@@ -96,29 +125,16 @@ class IntegralLineOfSight(Guided):
         task : Task, optional
             Its lookahead, corridor and control interval are used; by default the
             environment's own.
-        lookahead_lengths : float, optional
-            Ship lengths; by default that of the task. Longer turns gentler, shorter
-            comes back sooner.
-        integral_lengths : float, optional
-            Time over which a steady cross-track error is integrated to as much again,
-            in times to travel one ship length. By default 4 times `lookahead_lengths`,
-            with which the way back to the path is critically damped; less swings, more
-            is slower.
+        **settings
+            Fields of `LineOfSightSettings`: `lookahead_lengths`, `integral_lengths`.
         """
         asked = with_path(task)
-        if lookahead_lengths is None:
-            lookahead_lengths = asked.lookahead
-        check_number(lookahead_lengths, "lookahead_lengths", above=0.0)
-        if integral_lengths is None:
-            integral_lengths = CRITICAL * lookahead_lengths
-        check_number(integral_lengths, "integral_lengths", above=0.0)
-
+        own: Any = LineOfSightSettings(**settings).completed(model, asked)
         gains = {
-            "lookahead": lookahead_lengths * model.particulars["length"],
-            "integral": 1.0 / (integral_lengths * model.travel_time),
+            "lookahead": own.lookahead_lengths * model.particulars["length"],
+            "integral": 1.0 / (own.integral_lengths * model.travel_time),
         }
-        design = {"integral_lengths": float(integral_lengths)}
-        return cls.leading(model, autopilot, asked, gains, design)
+        return cls.leading(model, autopilot, asked, gains, own.to_dict())
 
     @cached_property
     def parameters(self) -> LineOfSightGains:

@@ -36,29 +36,74 @@ from agents.controllers.linear_loop import (
     sample_ship,
 )
 from agents.controllers.margins import Compensator
+from agents.settings import Settings, Step, setting
 from shipgym import ShipModel
 from shipgym.arrays import Floats
-from shipgym.checks import check_number
 from shipgym.engine.compiling import tell_who_waits
 from shipgym.engine.records import Record
 from shipgym.models.by_name import takes_name
 from shipgym.tasks.scales import RUDDER_WEIGHT
 
 
-class SteeringCost(NamedTuple):
-    """Weights of an LQ design; that of the squared heading error is 1."""
+@dataclass(frozen=True)
+class SteeringCost(Settings):
+    """Weights of an LQ design; that of the squared heading error is 1.
 
-    rudder_weight: float  # of the squared rudder
-    rate_weight_s2: float  # of the squared rudder rate, s^2
-    integral_time: float  # for an offset to decay, s
+    They are those of the environment's reward, with that of the rudder rate raised for
+    the gear's limit (`rate_weight`). The reward has none on the integral of the error;
+    it is given the one with which an offset decays over about `integral_lengths` ship
+    lengths, at hardly any cost.
+    """
 
-    @property
-    def weights(self) -> dict[str, float]:
-        """The two weights by name, as a controller's file has them."""
-        return {
-            "rudder_weight": self.rudder_weight,
-            "rate_weight_s2": self.rate_weight_s2,
-        }
+    rudder_weight: float = setting(
+        "weight of the squared rudder", RUDDER_WEIGHT, above=0.0, search=Step(0.7)
+    )
+    rate_weight_s2: float | None = setting(
+        "weight of the squared rudder rate, s^2; by default `rate_weight`",
+        None,
+        above=0.0,
+        search=Step(1.0),
+    )
+    integral_lengths: float = setting(
+        "time for an offset to decay, in times to travel one ship length; the rest"
+        " follows the cost",
+        20.0,
+        above=0.0,
+        search=Step(1.0),
+    )
+
+    def completed(self, model: ShipModel, dt: float) -> Self:
+        """Fill in what follows from a model; `dt`: control interval, s."""
+        if self.rate_weight_s2 is not None:
+            return self
+        return replace(self, rate_weight_s2=rate_weight(model))
+
+    def gains(self, ship: SampledShip, travel_time: float) -> dict[str, float]:
+        """Gains on the deviations of a sampled ship, by signal.
+
+        `travel_time`: to travel one ship length, s.
+        """
+        gains = (-lq_gain(ship, self, travel_time)).tolist()
+        return dict(zip(SIGNALS, gains, strict=True))
+
+
+@dataclass(frozen=True)
+class LQSettings(SteeringCost):
+    """Settings of LQ."""
+
+    rudder_time: float = setting(
+        "time constant of a low-pass on the order, in times to travel one ship length",
+        0.0,
+        at_least=0.0,
+        search=Step(1.2, start=0.01),
+    )
+    rudder_band_deg: float = setting(
+        "by how much an order is to differ from the last one, degrees",
+        0.0,
+        at_least=0.0,
+        at_most=90.0,
+        search=Step(1.2, start=0.05),
+    )
 
 
 class QuietFeedback(NamedTuple):
@@ -100,6 +145,7 @@ class LQ(Controller):
     """
 
     kind: ClassVar[str] = "lq"
+    settings_type: ClassVar[type[Settings]] = LQSettings
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = {
         signal: (signal, 1.0) for signal in SIGNALS
     }
@@ -113,25 +159,14 @@ class LQ(Controller):
     @classmethod
     @takes_name
     def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        dt: float | None = None,
-        integral_lengths: float = 20.0,
-        rudder_weight: float = RUDDER_WEIGHT,
-        rate_weight_s2: float | None = None,
-        rudder_time: float = 0.0,
-        rudder_band_deg: float = 0.0,
+        cls, model: ShipModel, *, dt: float | None = None, **settings: float | None
     ) -> Self:
         """Design on a model, about straight running.
 
-        The weights are those of the environment's reward, with that of the rudder rate
-        raised for the gear's limit (`rate_weight`). A ship with a memory of yaw, which
-        nothing measures, is designed for as one of first order. The reward has none on
-        the integral of the error; it is given the one with which an offset decays over
-        about `integral_lengths` ship lengths, at hardly any cost.
+        A ship with a memory of yaw, which nothing measures, is designed for as one of
+        first order.
 
-        Raises InputError if the model has no straight course, an argument is out of its
+        Raises InputError if the model has no straight course, a setting is out of its
         range, or the low-pass makes the loop unstable.
 
         Parameters
@@ -140,39 +175,22 @@ class LQ(Controller):
             Stable or unstable on its course.
         dt : float, optional
             Control interval, s; by default that of the environment.
-        integral_lengths : float
-            Time for an offset to decay, in times to travel one ship length. The rest
-            follows the cost.
-        rudder_weight : float
-            Weight of the squared rudder beside that of the heading error; by default
-            the environment's.
-        rate_weight_s2 : float, optional
-            Weight of the squared rudder rate, s^2; by default `rate_weight`.
-        rudder_time : float
-            Time constant of a low-pass on the order, in times to travel one ship
-            length.
-        rudder_band_deg : float
-            By how much an order is to differ from the last one, degrees.
+        **settings
+            Fields of `LQSettings`: `rudder_weight`, `rate_weight_s2`,
+            `integral_lengths`, `rudder_time`, `rudder_band_deg`.
         """
-        check_number(rudder_time, "rudder_time", at_least=0.0)
-        check_number(rudder_band_deg, "rudder_band_deg", at_least=0.0, at_most=90.0)
         interval = checked_interval(model, dt)
-        cost = steering_cost(
-            model,
-            integral_lengths=integral_lengths,
-            rudder_weight=rudder_weight,
-            rate_weight_s2=rate_weight_s2,
-        )
+        own = LQSettings(**settings).completed(model, interval)
         ship = measured = sample_ship(model, interval)
         if "q" in model.state_names:
             measured = sample_ship(model, interval, first_order=True)
+        low_pass = own.rudder_time * model.travel_time
         gains = {
-            **lq_gains(measured, cost),
-            "rudder_update": interval / (interval + rudder_time * model.travel_time),
-            "rudder_band": float(np.radians(rudder_band_deg)),
+            **own.gains(measured, model.travel_time),
+            "rudder_update": interval / (interval + low_pass),
+            "rudder_band": float(np.radians(own.rudder_band_deg)),
         }
-        design = {"integral_lengths": float(integral_lengths), **cost.weights}
-        return cls.designed(model, ship, gains, design)
+        return cls.designed(model, ship, gains, own.to_dict())
 
     @cached_property
     def is_quiet(self) -> bool:
@@ -209,32 +227,7 @@ class LQ(Controller):
         return super(LQ, without).loop()
 
 
-def steering_cost(
-    model: ShipModel,
-    integral_lengths: float,
-    rudder_weight: float,
-    rate_weight_s2: float | None,
-) -> SteeringCost:
-    """Cost from the arguments of `LQ.from_model`; InputError if one is out of range."""
-    check_number(integral_lengths, "integral_lengths", above=0.0)
-    check_number(rudder_weight, "rudder_weight", above=0.0)
-    if rate_weight_s2 is None:
-        rate_weight_s2 = rate_weight(model)
-    check_number(rate_weight_s2, "rate_weight_s2", above=0.0)
-    return SteeringCost(
-        rudder_weight=float(rudder_weight),
-        rate_weight_s2=float(rate_weight_s2),
-        integral_time=integral_lengths * model.travel_time,
-    )
-
-
-def lq_gains(ship: SampledShip, cost: SteeringCost) -> dict[str, float]:
-    """Gains on the deviations of a sampled ship, by signal."""
-    gains = (-lq_gain(ship, cost)).tolist()
-    return dict(zip(SIGNALS, gains, strict=True))
-
-
-def lq_gain(ship: SampledShip, cost: SteeringCost) -> Floats:
+def lq_gain(ship: SampledShip, cost: SteeringCost, travel_time: float) -> Floats:
     """Gain G of order = -G x that minimises the steering cost on a ship, shape (5,)."""
     if "control" not in sys.modules:
         tell_who_waits("shipgym: importing python-control, about a second")
@@ -242,7 +235,7 @@ def lq_gain(ship: SampledShip, cost: SteeringCost) -> Floats:
 
     measured = np.eye(len(SIGNALS))
     plant = control.ss(ship.A, ship.B, measured, 0.0, ship.dt)
-    C, D = cost_outputs(ship, cost)
+    C, D = cost_outputs(ship, cost, travel_time)
     Q = C.T @ C
     R = D.T @ D
     N = C.T @ D
@@ -251,7 +244,9 @@ def lq_gain(ship: SampledShip, cost: SteeringCost) -> Floats:
     return row
 
 
-def cost_outputs(ship: SampledShip, cost: SteeringCost) -> tuple[Floats, Floats]:
+def cost_outputs(
+    ship: SampledShip, cost: SteeringCost, travel_time: float
+) -> tuple[Floats, Floats]:
     """Outputs z[k] = C x[k] + D order[k] whose squares add up to the steering cost.
 
     The reward of an interval is on the state at its end, z[k] = (error, weighted
@@ -259,8 +254,9 @@ def cost_outputs(ship: SampledShip, cost: SteeringCost) -> tuple[Floats, Floats]
     input (Anderson & Moore 1990, chapter 3).
     """
     of_rudder = np.sqrt(cost.rudder_weight)
-    of_rate = np.sqrt(cost.rate_weight_s2) / ship.dt
-    of_integral = 1.0 / cost.integral_time
+    rate_weight: Any = cost.rate_weight_s2
+    of_rate = np.sqrt(rate_weight) / ship.dt
+    of_integral = 1.0 / (cost.integral_lengths * travel_time)
     weights = np.array(
         [
             [1.0],

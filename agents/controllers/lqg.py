@@ -13,18 +13,18 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from agents.controllers.controller import Bounds, Controller
-from agents.controllers.kalman import KalmanFilter, course_filter, with_waves
+from agents.controllers.kalman import course_filter, with_waves
 from agents.controllers.law import Gains, Law, Number, Signals, wrapped
 from agents.controllers.linear_loop import checked_interval, sample_ship
-from agents.controllers.lq import LQ, lq_gains, steering_cost
+from agents.controllers.lq import LQ, SteeringCost
 from agents.controllers.margins import check_stable
 from agents.controllers.memory import from_columns
+from agents.settings import Settings, Step, setting
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.engine.records import Record
 from shipgym.models.by_name import takes_name
-from shipgym.tasks.scales import RUDDER_WEIGHT
 
 # least jump of the heading error that is a new course, rad, and the same in standard
 # deviations of what noise explains
@@ -181,6 +181,35 @@ def corrected(row: Measured, innovation: Measured) -> Number:
     )
 
 
+@dataclass(frozen=True)
+class LQGSettings(SteeringCost):
+    """Settings of LQG: the weights of LQ, and what its filter expects."""
+
+    noise: float = setting(
+        "of heading and yaw rate, in multiples of a sea trial's sensors (`SEA_TRIAL`)",
+        1.0,
+        above=0.0,
+        search=Step(1.0),
+    )
+    disturbance_deg: float = setting(
+        "how much the sea pushes the ship: standard deviation of a rudder angle, drawn"
+        " in each interval, that would do the same; more makes the filter trust what"
+        " is measured",
+        2.0,
+        above=0.0,
+        search=Step(1.0),
+    )
+    wave_period: float | None = setting(
+        "of the first-order motion, s, as it is met; by default it is not modelled",
+        None,
+        above=0.0,
+        search=Step(0.3, reach=3.0),
+    )
+    wave_heading_deg: float = setting(
+        "standard deviation of the heading in it, degrees", 1.0, above=0.0
+    )
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LQG(Controller):
     """LQ feedback of motions that a Kalman filter estimates.
@@ -206,6 +235,7 @@ class LQG(Controller):
     """
 
     kind: ClassVar[str] = "lqg"
+    settings_type: ClassVar[type[Settings]] = LQGSettings
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
     law: ClassVar[Law] = staticmethod(lqg_law)
     memory_record: ClassVar[Record] = LQGMemory
@@ -240,70 +270,45 @@ class LQG(Controller):
     @classmethod
     @takes_name
     def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        dt: float | None = None,
-        integral_lengths: float = 20.0,
-        rudder_weight: float = RUDDER_WEIGHT,
-        rate_weight_s2: float | None = None,
-        noise: float = 1.0,
-        disturbance_deg: float = 2.0,
-        wave_period: float | None = None,
-        wave_heading_deg: float = 1.0,
+        cls, model: ShipModel, *, dt: float | None = None, **settings: float | None
     ) -> Self:
         """Design on a model, about straight running: LQ's gains and a Kalman filter.
 
-        Raises InputError if the model has no straight course, or an argument is out of
+        Raises InputError if the model has no straight course, or a setting is out of
         its range.
 
         Parameters
         ----------
-        model, dt, integral_lengths, rudder_weight, rate_weight_s2
+        model, dt
             As in `LQ.from_model`.
-        noise : float
-            Of heading and yaw rate, in multiples of a sea trial's sensors
-            (`SEA_TRIAL`).
-        disturbance_deg : float
-            How much the sea pushes the ship: standard deviation of a rudder angle,
-            drawn in each interval, that would do the same. More makes the filter trust
-            what is measured.
-        wave_period : float, optional
-            Of the first-order motion, s, as it is met; by default it is not modelled.
-        wave_heading_deg : float
-            Standard deviation of the heading in it, degrees.
+        **settings
+            Fields of `LQGSettings`: the weights of `LQ`, `noise`, `disturbance_deg`,
+            `wave_period`, `wave_heading_deg`.
         """
-        check_number(noise, "noise", above=0.0)
-        check_number(disturbance_deg, "disturbance_deg", above=0.0)
         interval = checked_interval(model, dt)
-        cost = steering_cost(
-            model,
-            integral_lengths=integral_lengths,
-            rudder_weight=rudder_weight,
-            rate_weight_s2=rate_weight_s2,
-        )
+        own = LQGSettings(**settings).completed(model, interval)
         ship = sample_ship(model, interval)
-
-        disturbance = np.radians(disturbance_deg)
+        disturbance = np.radians(own.disturbance_deg)
         states = course_filter(model, ship.about, interval, disturbance)
-        if wave_period is not None:
-            states = _in_waves(states, wave_period, wave_heading_deg, interval)
-        gain, deviations = states.gain(noise)
+        if own.wave_period is not None:
+            check_number(
+                own.wave_period,
+                "wave_period",
+                above=2.0 * interval,
+                hint="two control intervals, in s",
+            )
+            deviation = np.radians(own.wave_heading_deg)
+            states = with_waves(states, own.wave_period, deviation, interval)
+        gain, deviations = states.gain(own.noise)
 
-        design = {
-            "integral_lengths": float(integral_lengths),
-            **cost.weights,
-            "noise": float(noise),
-            "disturbance_deg": float(disturbance_deg),
-            "new_course_rad": max(NEW_COURSE, GATE * deviations[1]),
-        }
-        if wave_period is not None:
-            design["wave_period"] = float(wave_period)
+        design = own.to_dict()
+        if own.wave_period is None:
+            del design["wave_period"]
         return cls.designed(
             model,
             ship,
-            lq_gains(ship, cost),
-            design,
+            own.gains(ship, model.travel_time),
+            {**design, "new_course_rad": max(NEW_COURSE, GATE * deviations[1])},
             transition=states.transition,
             input=states.effect,
             kalman=gain,
@@ -325,21 +330,6 @@ class LQG(Controller):
             neutral_rudder=self.neutral_rudder,
             new_course=self.design["new_course_rad"],
         )
-
-
-def _in_waves(
-    course: KalmanFilter, period: float, heading_deg: float, interval: float
-) -> KalmanFilter:
-    """Filter with a wave model; InputError for a period or a heading out of range."""
-    check_number(
-        period,
-        "wave_period",
-        above=2.0 * interval,
-        hint="two control intervals, in s",
-    )
-    check_number(heading_deg, "wave_heading_deg", above=0.0)
-    deviation = np.radians(heading_deg)
-    return with_waves(course, period, deviation, interval)
 
 
 def _filled(record: Record, numbers: Floats, shape: tuple[int, ...]) -> Any:

@@ -33,10 +33,14 @@ from agents.controllers.law import (
 from agents.controllers.lq import LQ
 from agents.controllers.memory import selected
 from agents.controllers.path_ahead import FAR, PathAhead, Place, turned
-from agents.controllers.wheel_over import WheelOver, course_over_ground
+from agents.controllers.wheel_over import (
+    WheelOver,
+    WheelOverSettings,
+    course_over_ground,
+)
+from agents.settings import Settings, Step, setting
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
-from shipgym.checks import check_number
 from shipgym.engine.records import Record, table_of
 from shipgym.envs.engine import Engine
 from shipgym.models.by_name import takes_name
@@ -76,11 +80,31 @@ class PathCosts(NamedTuple):
     roll: float  # per rad^2
 
 
+@dataclass(frozen=True)
+class MPCSettings(WheelOverSettings):
+    """Settings of MPC: those of wheel-over, and of the search of plans."""
+
+    horizon_lengths: float = setting(
+        "how far it looks ahead, in times to travel one ship length",
+        6.0,
+        above=0.0,
+        at_most=40.0,
+    )
+    deviation_deg: float = setting(
+        "standard deviation of the courses that are tried first, degrees",
+        3.0,
+        above=0.0,
+        at_most=60.0,
+        search=Step(0.5),
+    )
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MPC(WheelOver):
     """Wheel-over whose course is improved by sampling on the design model `ship`."""
 
     kind: ClassVar[str] = "mpc"
+    settings_type: ClassVar[type[Settings]] = MPCSettings
     has_ship: ClassVar[bool] = True
     memory_record: ClassVar[Record] = PlanMemory
     reads: ClassVar[tuple[str, ...]] = (*WheelOver.reads, "yaw_rate", "rudder")
@@ -111,9 +135,7 @@ class MPC(WheelOver):
         *,
         autopilot: Policy | None = None,
         task: Task | None = None,
-        horizon_lengths: float = 6.0,
-        deviation_deg: float = 3.0,
-        **settings: Any,
+        **settings: float | None,
     ) -> Self:
         """Lead LQ along the paths of a task.
 
@@ -125,24 +147,19 @@ class MPC(WheelOver):
             By default `LQ.from_model(model)`.
         task : Task, optional
             Also its weights are used; by default the environment's own.
-        horizon_lengths : float
-            How far it looks ahead, in times to travel one ship length.
-        deviation_deg : float
-            Standard deviation of the courses that are tried first.
         **settings
-            Those of `WheelOver.from_model`, with its errors.
+            Fields of `MPCSettings`: those of `WheelOver`, `horizon_lengths`,
+            `deviation_deg`. Errors as in `WheelOver.from_model`.
         """
-        check_number(horizon_lengths, "horizon_lengths", above=0.0, at_most=40.0)
-        check_number(deviation_deg, "deviation_deg", above=0.0, at_most=60.0)
         asked = with_path(task)
         guide = super().from_model(model, autopilot=autopilot, task=asked, **settings)
-
-        horizon_s = horizon_lengths * model.travel_time
+        own = guide.design
+        horizon_s = own["horizon_lengths"] * model.travel_time
         steps = round(horizon_s / (COARSE * guide.design["dt"]))
         design = {
-            **guide.design,
+            **own,
             "horizon_steps": float(max(1, steps)),
-            "deviation": float(np.radians(deviation_deg)),
+            "deviation": float(np.radians(own["deviation_deg"])),
             "water_depth": min(asked.water_depth, DEEP),
             **path_costs(asked, model)._asdict(),
         }

@@ -6,18 +6,73 @@ from the steering cost).
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar, NamedTuple, Self
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from agents.controllers.controller import Controller
-from agents.controllers.linear_loop import checked_interval, rate_weight, sample_ship
+from agents.controllers.linear_loop import (
+    checked_interval,
+    rate_weight,
+    sample_ship,
+    small_motions,
+)
+from agents.settings import Settings, Step, setting
 from shipgym import ShipModel
-from shipgym.checks import check_number
 from shipgym.models.by_name import takes_name
-from shipgym.models.linear import Nomoto, linearise, nomoto_of
+from shipgym.models.linear import Nomoto, nomoto_of
 from shipgym.tasks.scales import RUDDER_WEIGHT
+
+
+@dataclass(frozen=True)
+class PIDSettings(Settings):
+    """Settings of PID."""
+
+    frequency: float | None = setting(
+        "natural frequency of the dominant pair of poles, rad/s; by default near that"
+        " which the environment's cost asks for, lower where the lag is long",
+        None,
+        above=0.0,
+        search=Step(0.5),
+    )
+    damping: float | None = setting(
+        "its damping ratio, by default that which the cost asks for",
+        None,
+        above=0.0,
+        search=Step(0.5),
+    )
+    integral_lengths: float = setting(
+        "time for an offset to decay, in times to travel one ship length",
+        20.0,
+        above=0.0,
+        search=Step(1.0),
+    )
+
+    def completed(self, model: ShipModel, dt: float) -> Self:
+        """Fill in what follows from a model and the control interval, s.
+
+        Measured by the environment's cost on ships stable and unstable, gears slow and
+        fast, and lags up to half a ship length: with these the PID costs at most 1.1
+        times its best, 1.2 times in course changes of 5 deg.
+        """
+        response = nomoto(model)
+        optimal = optimal_poles(response, rate_weight(model))
+        damping = optimal.damping if self.damping is None else self.damping
+        frequency = self.frequency
+        if frequency is None:
+            # of the optimal regulator, which feeds back the rudder too and can be
+            # faster
+            frequency_share = 0.85
+            lag = lag_of(model, dt)
+            slow = self.integral_pole(model)
+            largest = largest_frequency(response, lag, damping, slow)
+            frequency = min(frequency_share * optimal.frequency, largest)
+        return replace(self, frequency=frequency, damping=damping)
+
+    def integral_pole(self, model: ShipModel) -> float:
+        """Pole of the integral action, 1/s."""
+        return 1.0 / (self.integral_lengths * model.travel_time)
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +84,7 @@ class PID(Controller):
     """
 
     kind: ClassVar[str] = "pid"
+    settings_type: ClassVar[type[Settings]] = PIDSettings
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = {
         "proportional": ("heading_error", 1.0),
         "integral": ("heading_error_integral", 1.0),
@@ -38,22 +94,14 @@ class PID(Controller):
     @classmethod
     @takes_name
     def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        dt: float | None = None,
-        frequency: float | None = None,
-        damping: float | None = None,
-        integral_lengths: float = 20.0,
+        cls, model: ShipModel, *, dt: float | None = None, **settings: float | None
     ) -> Self:
         """Design on a model, about straight running.
 
         The poles are placed on the first-order Nomoto form with half of the steering
-        gear's lag and half a control interval for the held command. Their natural
-        frequency and damping are, if not given, near those that the environment's cost
-        asks for (`optimal_poles`), lower where the lag is long.
+        gear's lag and half a control interval for the held command.
 
-        Raises InputError if the model has no straight course, an argument is out of its
+        Raises InputError if the model has no straight course, a setting is out of its
         range, or the poles asked for leave the ship unstable.
 
         Parameters
@@ -61,46 +109,36 @@ class PID(Controller):
         model : ShipModel
         dt : float, optional
             Control interval, s; by default that of the environment.
-        frequency : float, optional
-            Natural frequency of the dominant pair of poles, rad/s.
-        damping : float, optional
-            Its damping ratio.
-        integral_lengths : float
-            Time for an offset to decay, in times to travel one ship length.
+        **settings
+            Fields of `PIDSettings`: `frequency`, `damping`, `integral_lengths`.
         """
-        check_number(integral_lengths, "integral_lengths", above=0.0)
         interval = checked_interval(model, dt)
         ship = sample_ship(model, interval)
-        response = nomoto_of(*linearise(model, ship.about))
-        # Measured by the environment's cost on ships stable and unstable, gears slow
-        # and fast, and lags up to half a ship length: with these the PID costs at most
-        # 1.1 times its best, 1.2 times in course changes of 5 deg. of the gear's lag
-        # that is made up for; all would make the ship slow
-        lag_share = 0.5
-        lag = lag_share * model.steering.time_constant + 0.5 * interval
-        slow = 1.0 / (integral_lengths * model.travel_time)
+        own = PIDSettings(**settings).completed(model, interval)
+        lag = lag_of(model, interval)
+        gains = place_poles(
+            nomoto(model),
+            lag,
+            own.frequency,
+            own.damping,
+            slow=own.integral_pole(model),
+        )
+        return cls.designed(model, ship, gains, {**own.to_dict(), "lag": lag})
 
-        optimal = optimal_poles(response, rate_weight(model))
-        if damping is None:
-            damping = optimal.damping
-        check_number(damping, "damping", above=0.0)
-        if frequency is None:
-            # of the optimal regulator, which feeds back the rudder too and can be
-            # faster
-            frequency_share = 0.85
-            largest = largest_frequency(response, lag, damping, slow)
-            frequency = min(frequency_share * optimal.frequency, largest)
-        else:
-            check_number(frequency, "frequency", above=0.0)
 
-        gains = place_poles(response, lag, frequency, damping, slow)
-        design = {
-            "frequency": float(frequency),
-            "damping": float(damping),
-            "integral_lengths": float(integral_lengths),
-            "lag": lag,
-        }
-        return cls.designed(model, ship, gains, design)
+def nomoto(model: ShipModel) -> Nomoto:
+    """First-order form of a ship about straight running."""
+    motions = small_motions(model)
+    return nomoto_of(motions.steering, motions.rudder)
+
+
+def lag_of(model: ShipModel, dt: float) -> float:
+    """Lag of the gear that is made up for, and of the held command, s.
+
+    All of the gear's would make the ship slow.
+    """
+    lag_share = 0.5
+    return lag_share * model.steering.time_constant + 0.5 * dt
 
 
 class Poles(NamedTuple):
@@ -156,7 +194,7 @@ def largest_frequency(
 
 
 def place_poles(
-    response: Nomoto, lag: float, frequency: float, damping: float, slow: float
+    response: Nomoto, lag: float, frequency: Any, damping: Any, slow: float
 ) -> dict[str, float]:
     """PID gains for a pair of poles and a slow one on Nomoto's form with a gear.
 

@@ -15,14 +15,21 @@ Hydrodynamics and Motion Control, 10.3 (line of sight), 2.4 (crab angle), 13.2
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from agents.controllers.controller import ANY_NUMBER, Bounds
-from agents.controllers.guided import COURSE_ERROR, TURNS, Guided, with_path
+from agents.controllers.guided import (
+    COURSE_ERROR,
+    TURNS,
+    Guided,
+    lookahead_setting,
+    own_lookahead,
+    with_path,
+)
 from agents.controllers.interface import Policy
 from agents.controllers.law import Law, Number, PathSignals, clipped, wrapped
 from agents.controllers.lq import LQ
@@ -33,8 +40,8 @@ from agents.controllers.seen_current import (
     way_through_water,
 )
 from agents.controllers.wheel_over import own_lead
+from agents.settings import Settings, Step, setting
 from shipgym import InputError, ShipModel
-from shipgym.checks import check_number
 from shipgym.engine.records import Record
 from shipgym.models.by_name import takes_name
 from shipgym.tasks.task import Task
@@ -200,76 +207,122 @@ def half_square(distance: Number) -> Number:
     return 0.5 * ahead * ahead
 
 
-class PreviewSettings(NamedTuple):
-    """Settings of `PreviewLQ.from_model`.
+def curvature_weight(place: str, default: float) -> Any:
+    """Setting of the weight of the path's curvature at a place."""
+    return setting(
+        f"weight of the path's curvature {place}; at the end of the reach it is 0",
+        default,
+        at_least=-10.0,
+        at_most=10.0,
+        search=Step(0.15, is_factor=False),
+    )
 
-    Attributes
-    ----------
-    lookahead_lengths : float
-        Lookahead of the way back to the track, ship lengths; by default the task's.
-    reach_lengths : float
-        How far ahead the path's curvature counts, ship lengths; by default five
-        times `own_lead`.
-    weight_0, weight_1, weight_2, weight_3, weight_4 : float
-        Of curvature beside the ship, and at 1, 2, 3 and 6 tenths of the reach, at whose
-        end it is 0; by default 1, 1, 0.5, 0 and 0, which is the mean course of the path
-        from half of `own_lead` ahead to one and a half.
-    reach_power : float
-        Power of speed over ground over service speed in the reach: 1 for a reach in
-        time.
-    crab_share : float
-        Share of the crab angle that is steered against a current.
-    course_share : float
-        Share of heading and yaw rate that is reckoned from the course over ground,
-        which waves move less; by default a half in waves, else 0.
-    current_time, yaw_time : float
-        Time constants of the low-passes on the current and on the yaw rate, in times to
-        travel one ship length.
-    sway_gain : float
-        Change of course, rad, per sway over service speed.
-    dead_band_deg : float
-        Heading error that is left alone.
-    speed_power : float
-        Power of service speed over speed in the gain on the heading error.
-    roll_gain : float
-        Change of course per heel.
-    roll_time : float
-        Change of course per rate of heel, in times to travel one ship length.
+
+@dataclass(frozen=True)
+class PreviewSettings(Settings):
+    """Settings of LQ with preview.
+
+    The weights are by default those of the mean course of the path from half of
+    `own_lead` ahead to one and a half.
     """
 
-    lookahead_lengths: float
-    reach_lengths: float
-    weight_0: float
-    weight_1: float
-    weight_2: float
-    weight_3: float
-    weight_4: float
-    reach_power: float
-    crab_share: float
-    course_share: float
-    current_time: float
-    yaw_time: float
-    sway_gain: float
-    dead_band_deg: float
-    speed_power: float
-    roll_gain: float
-    roll_time: float
+    lookahead_lengths: float | None = lookahead_setting()
+    reach_lengths: float | None = setting(
+        "how far ahead the path's curvature counts, ship lengths; by default five times"
+        " `own_lead`",
+        None,
+        at_least=1e-4,
+        at_most=1e4,
+        search=Step(0.4),
+    )
+    weight_0: float = curvature_weight("beside the ship", 1.0)
+    weight_1: float = curvature_weight("at a tenth of the reach", 1.0)
+    weight_2: float = curvature_weight("at two tenths", 0.5)
+    weight_3: float = curvature_weight("at three tenths", 0.0)
+    weight_4: float = curvature_weight("at six tenths", 0.0)
+    reach_power: float = setting(
+        "power of speed over ground over service speed in the reach: 1 for a reach in"
+        " time",
+        0.0,
+        at_least=-2.0,
+        at_most=4.0,
+        search=Step(0.5, is_factor=False),
+    )
+    crab_share: float = setting(
+        "share of the crab angle that is steered against a current",
+        1.0,
+        at_least=0.0,
+        at_most=2.0,
+        search=Step(0.2, is_factor=False),
+    )
+    course_share: float | None = setting(
+        "share of heading and yaw rate that is reckoned from the course over ground,"
+        " which waves move less; by default a half in waves, else 0",
+        None,
+        at_least=0.0,
+        at_most=1.0,
+        search=Step(0.3, is_factor=False),
+    )
+    current_time: float = setting(
+        "time constant of a low-pass on the current, in times to travel a ship length",
+        0.3,
+        at_least=0.0,
+        search=Step(1.0),
+    )
+    yaw_time: float = setting(
+        "the same of the yaw rate", 0.0, at_least=0.0, search=Step(1.2, start=0.01)
+    )
+    sway_gain: float = setting(
+        "change of course, rad, per sway over service speed",
+        0.0,
+        at_least=-100.0,
+        at_most=100.0,
+        search=Step(0.5, is_factor=False),
+    )
+    dead_band_deg: float = setting(
+        "heading error that is left alone, degrees",
+        0.0,
+        at_least=0.0,
+        at_most=180.0,
+        search=Step(1.2, start=0.05),
+    )
+    speed_power: float = setting(
+        "power of service speed over speed in the gain on the heading error",
+        0.0,
+        at_least=-2.0,
+        at_most=4.0,
+        search=Step(0.5, is_factor=False),
+    )
+    roll_gain: float = setting(
+        "change of course per heel, where the task shows it",
+        0.0,
+        at_least=-100.0,
+        at_most=100.0,
+        search=Step(0.4, is_factor=False),
+    )
+    roll_time: float = setting(
+        "change of course per rate of heel, in times to travel one ship length",
+        0.0,
+        at_least=-100.0,
+        at_most=100.0,
+        search=Step(0.4, is_factor=False),
+    )
 
-    def check(self) -> None:
-        """Refuse numbers out of their range; InputError names the setting."""
-        for name in ("lookahead_lengths", "reach_lengths"):
-            check_number(getattr(self, name), name, at_least=1e-4, at_most=1e4)
-        for name in ("weight_0", "weight_1", "weight_2", "weight_3", "weight_4"):
-            check_number(getattr(self, name), name, at_least=-10.0, at_most=10.0)
-        for name in ("current_time", "yaw_time"):
-            check_number(getattr(self, name), name, at_least=0.0)
-        check_number(self.crab_share, "crab_share", at_least=0.0, at_most=2.0)
-        check_number(self.course_share, "course_share", at_least=0.0, at_most=1.0)
-        check_number(self.dead_band_deg, "dead_band_deg", at_least=0.0, at_most=180.0)
-        for name in ("speed_power", "reach_power"):
-            check_number(getattr(self, name), name, at_least=-2.0, at_most=4.0)
-        for name in ("sway_gain", "roll_gain", "roll_time"):
-            check_number(getattr(self, name), name, at_least=-100.0, at_most=100.0)
+    def completed(
+        self, model: ShipModel, task: Task, autopilot: Policy | None = None
+    ) -> Self:
+        """Fill in what follows from a model, a task and the autopilot that is led."""
+        reach, share = self.reach_lengths, self.course_share
+        if reach is None:
+            reach = 5.0 * own_lead(model, autopilot)
+        if share is None:
+            share = 0.0 if task.weather.waves is None else 0.5
+        return replace(
+            self,
+            lookahead_lengths=own_lookahead(self.lookahead_lengths, task),
+            reach_lengths=reach,
+            course_share=share,
+        )
 
     def check_heel(self, shown: bool) -> None:
         """Refuse gains on heel that a task does not show; InputError names them."""
@@ -282,35 +335,30 @@ class PreviewSettings(NamedTuple):
             )
 
     def gains(self, model: ShipModel, task: Task, autopilot: LQ) -> dict[str, float]:
-        """Gains in SI units on the paths of a task, around LQ."""
+        """Gains in SI units on the paths of a task, around LQ; of whole settings."""
+        own: Any = self
         dt = task.interval(model)
         inner = autopilot.gains
         length, speed = model.particulars["length"], model.particulars["speed"]
         travel_time = model.travel_time
         scales = {quantity.name: quantity.scale for quantity in task.observed(model)}
-        return {
-            "lookahead": length * self.lookahead_lengths,
-            "reach": length * self.reach_lengths,
-            "weight_0": float(self.weight_0),
-            "weight_1": float(self.weight_1),
-            "weight_2": float(self.weight_2),
-            "weight_3": float(self.weight_3),
-            "weight_4": float(self.weight_4),
-            "reach_power": float(self.reach_power),
-            "crab_share": float(self.crab_share),
-            "course_share": float(self.course_share),
+        in_si = {
+            "lookahead": length * own.lookahead_lengths,
+            "reach": length * own.reach_lengths,
             "current_update": dt / (dt + self.current_time * travel_time),
             "yaw_update": dt / (dt + self.yaw_time * travel_time),
             "yaw_gain": inner["yaw_rate"] / inner["heading_error"],
             "sway_gain": self.sway_gain / speed,
-            "roll_gain": float(self.roll_gain),
             "roll_rate_gain": self.roll_time * travel_time,
             "dead_band": float(np.radians(self.dead_band_deg)),
-            "speed_power": float(self.speed_power),
             "path_radius": length * task.turn_radius,
             "sight": scales["next_turn_distance"],
             "service_speed": speed,
             "interval": dt,
+        }
+        return {
+            name: in_si[name] if name in in_si else getattr(self, name)
+            for name in PreviewGains._fields
         }
 
 
@@ -319,6 +367,7 @@ class PreviewLQ(Guided):
     """LQ around the course of the path ahead: track keeping by 22 numbers."""
 
     kind: ClassVar[str] = "preview-lq"
+    settings_type: ClassVar[type[Settings]] = PreviewSettings
     law: ClassVar[Law] = staticmethod(preview_law)
     memory_record: ClassVar[Record] = PreviewMemory
     observes: ClassVar[tuple[str, ...]] = (*Guided.observes, *COURSE_ERROR, *TURNS)
@@ -359,23 +408,7 @@ class PreviewLQ(Guided):
         *,
         autopilot: Policy | None = None,
         task: Task | None = None,
-        lookahead_lengths: float | None = None,
-        reach_lengths: float | None = None,
-        weight_0: float = 1.0,
-        weight_1: float = 1.0,
-        weight_2: float = 0.5,
-        weight_3: float = 0.0,
-        weight_4: float = 0.0,
-        reach_power: float = 0.0,
-        crab_share: float = 1.0,
-        course_share: float | None = None,
-        current_time: float = 0.3,
-        yaw_time: float = 0.0,
-        sway_gain: float = 0.0,
-        dead_band_deg: float = 0.0,
-        speed_power: float = 0.0,
-        roll_gain: float = 0.0,
-        roll_time: float = 0.0,
+        **settings: float | None,
     ) -> Self:
         """Design on a model, for the paths of a task.
 
@@ -383,9 +416,9 @@ class PreviewLQ(Guided):
         and her way lag behind in a steady turn (`own_lead`), the path's course is
         averaged from half a lead ahead to one and a half.
 
-        Raises InputError if an argument is out of its range, the autopilot is not LQ,
-        or it was designed for another ship, for a task without a path, and for gains
-        on heel where the task does not show it.
+        Raises InputError if a setting is out of its range, the autopilot is not LQ, or
+        it was designed for another ship, for a task without a path, and for gains on
+        heel where the task does not show it.
 
         Parameters
         ----------
@@ -396,40 +429,15 @@ class PreviewLQ(Guided):
         task : Task, optional
             Its lookahead, turns and control interval are used; by default the
             environment's own.
-        lookahead_lengths, reach_lengths, ... : float, optional
-            See `PreviewSettings`.
+        **settings
+            Fields of `PreviewSettings`.
         """
         asked = with_path(task)
         led = led_lq(autopilot, model, asked)
-        if lookahead_lengths is None:
-            lookahead_lengths = asked.lookahead
-        if reach_lengths is None:
-            reach_lengths = own_reach(model, led)
-        if course_share is None:
-            course_share = own_course_share(asked)
-        settings = PreviewSettings(
-            lookahead_lengths=lookahead_lengths,
-            reach_lengths=reach_lengths,
-            weight_0=weight_0,
-            weight_1=weight_1,
-            weight_2=weight_2,
-            weight_3=weight_3,
-            weight_4=weight_4,
-            reach_power=reach_power,
-            crab_share=crab_share,
-            course_share=course_share,
-            current_time=current_time,
-            yaw_time=yaw_time,
-            sway_gain=sway_gain,
-            dead_band_deg=dead_band_deg,
-            speed_power=speed_power,
-            roll_gain=roll_gain,
-            roll_time=roll_time,
-        )
-        settings.check()
-        settings.check_heel(shown="roll" in cls.observed_in(asked, model))
-        gains = settings.gains(model, asked, led)
-        return cls.leading(model, led, asked, gains, {})
+        own = PreviewSettings(**settings).completed(model, asked, led)
+        own.check_heel(shown="roll" in cls.observed_in(asked, model))
+        gains = own.gains(model, asked, led)
+        return cls.leading(model, led, asked, gains, own.to_dict())
 
     def turn_reach(self, angle: float) -> float:
         """See `Controller.turn_reach`: where weights of a tenth and more begin."""
@@ -461,14 +469,3 @@ def led_lq(autopilot: Policy | None, model: ShipModel, task: Task) -> LQ:
         name = type(autopilot).__name__
         raise InputError(f"autopilot: expected LQ, got {name}")
     return autopilot
-
-
-def own_course_share(task: Task) -> float:
-    """Share of the heading by the course over ground by design: a half in waves."""
-    in_waves = task.weather.waves is not None
-    return 0.5 if in_waves else 0.0
-
-
-def own_reach(model: ShipModel, autopilot: Policy | None) -> float:
-    """How far ahead the path's curvature counts by design, ship lengths."""
-    return 5.0 * own_lead(model, autopilot)

@@ -9,14 +9,22 @@ Sources: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control,
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from agents.controllers.controller import ANY_NUMBER, Bounds
-from agents.controllers.guided import COURSE_ERROR, TURNS, Guided, bend, with_path
+from agents.controllers.guided import (
+    COURSE_ERROR,
+    TURNS,
+    Guided,
+    bend,
+    lookahead_setting,
+    own_lookahead,
+    with_path,
+)
 from agents.controllers.interface import Policy
 from agents.controllers.law import (
     Law,
@@ -28,8 +36,8 @@ from agents.controllers.law import (
 )
 from agents.controllers.linear_loop import small_motions
 from agents.controllers.lq import LQ
+from agents.settings import Settings, Step, setting
 from shipgym import ShipModel
-from shipgym.checks import check_number
 from shipgym.models.by_name import takes_name
 from shipgym.tasks.task import Task
 
@@ -61,11 +69,42 @@ def course_over_ground(cross_track: Number, turns: Turns, p: WheelOverGains) -> 
     return ahead - np.arctan2(cross_track, p.lookahead)
 
 
+@dataclass(frozen=True)
+class WheelOverSettings(Settings):
+    """Settings of wheel-over."""
+
+    lookahead_lengths: float | None = lookahead_setting()
+    reach_lengths: float | None = setting(
+        "how far ahead the path's course is taken, ship lengths; by default `own_lead`",
+        None,
+        above=0.0,
+        search=Step(0.4),
+    )
+    crab_share: float = setting(
+        "share of the angle of drift by the current that is countered",
+        1.0,
+        at_least=0.0,
+        at_most=2.0,
+        search=Step(0.2, is_factor=False),
+    )
+
+    def completed(
+        self, model: ShipModel, task: Task, autopilot: Policy | None = None
+    ) -> Self:
+        """Fill in what follows from a model, a task and the autopilot that is led."""
+        reach = self.reach_lengths
+        if reach is None:
+            reach = own_lead(model, autopilot)
+        lookahead = own_lookahead(self.lookahead_lengths, task)
+        return replace(self, lookahead_lengths=lookahead, reach_lengths=reach)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WheelOver(Guided):
     """Line of sight that begins turns where the ship needs to, against currents too."""
 
     kind: ClassVar[str] = "wheel-over"
+    settings_type: ClassVar[type[Settings]] = WheelOverSettings
     law: ClassVar[Law] = staticmethod(wheel_over_law)
     observes: ClassVar[tuple[str, ...]] = (*Guided.observes, *COURSE_ERROR, *TURNS)
     reads: ClassVar[tuple[str, ...]] = (
@@ -96,44 +135,32 @@ class WheelOver(Guided):
         *,
         autopilot: Policy | None = None,
         task: Task | None = None,
-        lookahead_lengths: float | None = None,
-        reach_lengths: float | None = None,
-        crab_share: float = 1.0,
+        **settings: float | None,
     ) -> Self:
         """Lead an autopilot along the paths of a task.
 
-        Raises InputError if an argument is out of its range, or the autopilot was
+        Raises InputError if a setting is out of its range, or the autopilot was
         designed for another ship.
 
         Parameters
         ----------
         model, autopilot, task
             As in `IntegralLineOfSight.from_model`.
-        lookahead_lengths : float, optional
-            Lookahead on a leg, ship lengths; by default the task's.
-        reach_lengths : float, optional
-            How far ahead the path's course is taken, ship lengths; by default
-            `own_lead`.
-        crab_share : float
-            Share of the angle of drift by the current that is countered.
+        **settings
+            Fields of the class's `settings_type`; of `WheelOverSettings`:
+            `lookahead_lengths`, `reach_lengths`, `crab_share`.
         """
         asked = with_path(task)
-        if lookahead_lengths is None:
-            lookahead_lengths = asked.lookahead
-        check_number(lookahead_lengths, "lookahead_lengths", above=0.0)
-        if reach_lengths is None:
-            reach_lengths = own_lead(model, autopilot)
-        check_number(reach_lengths, "reach_lengths", above=0.0)
-        check_number(crab_share, "crab_share", at_least=0.0, at_most=2.0)
-
+        own: Any = cls.settings_type(**settings)
+        own = own.completed(model, asked, autopilot)
         length = model.particulars["length"]
         gains = {
-            "lookahead": length * lookahead_lengths,
-            "turn_reach": length * reach_lengths,
-            "crab_share": float(crab_share),
+            "lookahead": length * own.lookahead_lengths,
+            "turn_reach": length * own.reach_lengths,
+            "crab_share": own.crab_share,
             "path_radius": length * asked.turn_radius,
         }
-        return cls.leading(model, autopilot, asked, gains, {})
+        return cls.leading(model, autopilot, asked, gains, own.to_dict())
 
     @cached_property
     def parameters(self) -> WheelOverGains:

@@ -13,7 +13,7 @@ from agents.controllers.controller import Controller
 from agents.controllers.registry import controller_class
 from agents.jobs import HERE, JobEngine
 from agents.rollouts.course_keeping import Episodes, sail, step_response
-from agents.training.controller_space import SEARCHED
+from agents.training.controller_space import searched_kinds
 from agents.verification.closed_loop import ClosedLoop, Held
 from agents.verification.monte_carlo import MonteCarlo, monte_carlo
 from agents.verification.result import STEP_DEG, Pilot, Verification
@@ -189,7 +189,7 @@ def design_autopilots(
     for kind in dict.fromkeys(designs):
         made: Any = controller_class(kind)
         try:
-            if tune_seconds > 0.0 and kind in SEARCHED:
+            if tune_seconds > 0.0 and kind in searched_kinds():
                 tuned = tuned_design(kind, model, tune_seconds, tell)
                 found.tuned[kind] = tuned.in_words
                 controller = tuned.controller

@@ -168,12 +168,12 @@ def test_a_cluster_that_does_not_answer_is_no_fault_of_the_model(demo, tmp_path)
 
 def test_an_unknown_guest_is_refused_with_the_nearest_name(tmp_path):
     expected = (
-        "agent: expected a file, or one of .*'sharp-turn-ppo-s0'. Did you mean"
-        " 'sharp-turns-ppo-s0'"
+        "agent: expected a file, or one of .*'path-folowing-ppo'. Did you mean"
+        " 'path-following-ppo'"
     )
     with pytest.raises(InputError, match=expected):
         build_autopilot(
-            "examples/mariner/ship.toml", tmp_path / "out", agents=["sharp-turn-ppo-s0"]
+            "examples/mariner/ship.toml", tmp_path / "out", agents=["path-folowing-ppo"]
         )
     assert list(tmp_path.iterdir()) == []
 

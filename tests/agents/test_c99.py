@@ -230,7 +230,7 @@ GUIDANCE = {
 }
 LEARNED = {
     "ppo": random_policy(),
-    "path_ppo": load_agent("sharp-turns-ppo-s0"),
+    "path_ppo": load_agent("path-following-ppo"),
     "limited": random_policy(
         base=LQ.from_model(MARINER), action_repeat=3, rate_limit=0.1
     ),

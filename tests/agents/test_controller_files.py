@@ -201,7 +201,7 @@ def test_an_agent_is_found_by_its_file_its_folder_or_its_name(tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     DESIGNS["pid"].save(tmp_path / "agent.json")
     (tmp_path / "run").mkdir()
-    name = "sharp-turns-ppo-s0"
+    name = "path-following-ppo"
     for copy in ("run/agent.json", "pid", name):
         (tmp_path / copy).write_bytes((tmp_path / "agent.json").read_bytes())
     for found in ("agent.json", "run", "pid", name):
@@ -213,9 +213,9 @@ def test_an_agent_is_found_by_its_file_its_folder_or_its_name(tmp_path, monkeypa
     known = list_pretrained()
     assert known == sorted(path.stem for path in PRETRAINED.glob("*.json"))
     with pytest.raises(
-        InputError, match=f"got 'sharp-turn-ppo-s0'. Did you mean '{name}'"
+        InputError, match=f"got 'path-folowing-ppo'. Did you mean '{name}'"
     ):
-        load_agent("sharp-turn-ppo-s0")
+        load_agent("path-folowing-ppo")
 
 
 @pytest.mark.parametrize(

@@ -71,7 +71,7 @@ LINES = (
     (f"autopilot ship.toml {WRONG} --out report2", 2),
     ("autopilot ship.toml --address 127.0.0.1:9 --out report2", 2),
     ("export report/lq.json --c c --fmu lq.fmu --name lq", 0),
-    ("export sharp-turns-ppo-s1 --onnx policy.onnx", 0),
+    ("export path-following-ppo --onnx policy.onnx", 0),
     ("export tanker --c tanker --depth 25", 0),
     (
         f"train ppo {TASK_OF_OWN} {LEARNING} {SMALL} --randomise --from-nothing --seed"

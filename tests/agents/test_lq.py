@@ -9,12 +9,12 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
 from agents import LQ, PID, sail, step_response
-from agents.controllers.linear_loop import rate_weight, sample_ship, sampled
+from agents.controllers.linear_loop import sample_ship, sampled
 from agents.controllers.lq import SteeringCost, lq_gain
 from shipgym.errors import InputError
 from shipgym.models.linear import nomoto
 from shipgym.ships.steering import SteeringGear
-from shipgym.tasks.scales import RUDDER_WEIGHT, control_interval
+from shipgym.tasks.scales import control_interval
 from tests.agents.mariners import (
     HARD_TO_STEER,
     LENGTH_TIME,
@@ -42,8 +42,8 @@ def linear_cost(ship, gain, cost, n=4000):
 )
 def test_no_other_gains_are_cheaper_on_the_linear_ship(model):
     ship = sample_ship(model, 1.0)
-    cost = SteeringCost(RUDDER_WEIGHT, rate_weight(model), 20.0 * LENGTH_TIME)
-    gain = lq_gain(ship, cost)
+    cost = SteeringCost().completed(model, 1.0)
+    gain = lq_gain(ship, cost, LENGTH_TIME)
     best = linear_cost(ship, gain, cost)
     for i in range(5):
         for factor in (0.98, 1.02):

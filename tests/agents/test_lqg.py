@@ -200,7 +200,7 @@ def test_a_heading_opposite_to_the_course_is_estimated_as_any_other():
     """Through 180 degrees of error, where the measured one changes its sign."""
     lqg, kept = LQG.from_model(MARINER), []
     noise = 1e-3 * np.random.default_rng(0).normal(size=12)
-    still = Signals(0.0, -0.002, 0.0, 0.01, 0.0, 0.0, 0.0)
+    still = Signals(0.0, -0.002, 0.0, 0.01, 0.0, 0.0)
     for course in (0.0, np.pi - 0.012):
         memory = from_columns(lqg.memory_record, iter(np.zeros(lqg.memory_size)))
         estimates = []
