@@ -1,29 +1,19 @@
 """Folders of results: one process at a time, whole or not at all, no other files."""
 
 import os
-import shlex
 import shutil
 import socket
-import sys
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
-from datetime import datetime
 from glob import escape
 from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from shipgym.drafts import (
-    DRAFT,
-    abandoned_drafts,
-    atomic_path,
-    draft_folder,
-    remove_drafts,
-)
+from shipgym.drafts import DRAFT, atomic_path, draft_folder, remove_drafts
 from shipgym.errors import InputError
 
 ASIDE = ".old"  # ending of a folder that is about to be replaced
-PROCESS = "process"  # the first word of a lock of ours
 
 
 def check_folder(folder: Path, names: Collection[str]) -> None:
@@ -114,7 +104,8 @@ def in_use(folder: Path) -> Iterator[Path]:
     lock = _acquired(lock_path, folder)
     try:
         if lock.is_locked:
-            lock_path.write_text(process_description(), encoding="utf-8")
+            user = f"process {os.getpid()} on {socket.gethostname()}"
+            lock_path.write_text(user, encoding="utf-8")
             _put_back(target, lock_path.parent)
         remove_drafts(lock_path.parent)
         yield lock_path.parent
@@ -134,7 +125,9 @@ def _acquired(lock_path: Path, folder: Path) -> FileLock:
     Raises InputError if another process has it.
     """
     lock = FileLock(lock_path)
-    user = holder(lock_path)
+    user = "another process"
+    with suppress(OSError):
+        user = lock_path.read_text(encoding="utf-8", errors="replace") or user
     try:
         lock_path.parent.mkdir(parents=True, exist_ok=True)
         with suppress(NotImplementedError):
@@ -166,51 +159,6 @@ def _lock_path(folder: Path) -> Path:
     target = folder.resolve()
     home = target if _stands_alone(target) else target.parent
     return home / f".{target.name}.lock"
-
-
-def process_description() -> str:
-    """Describe this process, with its command, for a lock."""
-    path, *arguments = sys.argv
-    command = shlex.join([Path(path).name, *arguments])
-    beginning = command[:200]
-    now = datetime.now().astimezone()
-    since = now.isoformat(" ", "seconds")
-    host = socket.gethostname()
-    return f"{PROCESS} {os.getpid()} on {host} since {since} ({beginning})"
-
-
-def holder(lock: Path) -> str:
-    """Description of the process that has a lock."""
-    try:
-        text = lock.read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        text = ""
-    return text or "another process"
-
-
-def locks_and_drafts(folder: Path) -> Iterator[tuple[str, bool]]:
-    """Describe what processes keep in a folder; True if the process is dead."""
-    for draft in abandoned_drafts(folder):
-        yield (
-            f"{draft}: left by a process that was killed; the next run there removes"
-            " it",
-            True,
-        )
-    for path in sorted(folder.glob(".*.lock")):
-        user = holder(path)
-        if not user.startswith(PROCESS):  # not ours
-            continue
-        try:
-            with FileLock(path, timeout=0):
-                yield (
-                    f"{path}: left by {user}, which is dead; the next run there removes"
-                    " it",
-                    True,
-                )
-        except Timeout:
-            yield f"{path}: {user}", False
-        except OSError:  # another user's
-            continue
 
 
 @contextmanager

@@ -5,6 +5,7 @@ import inspect
 import os
 import sys
 from collections.abc import Callable
+from difflib import get_close_matches
 from errno import EBADF, ENOSPC, EPIPE
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -15,7 +16,7 @@ from typer.core import TyperGroup
 
 from agents.cli.parameters import take_parameters, typed_parameters
 
-FAILED, WRONG_INPUT, INTERRUPTED, TERMINATED = 1, 2, 130, 143  # exit codes
+FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130  # exit codes
 
 ShipFileArgument = Annotated[
     Path, Argument(metavar="SHIP.TOML", help="The ship file with its trials.")
@@ -127,6 +128,16 @@ def fail(message: str, code: int) -> NoReturn:
 
 class CommandGroup(TyperGroup):
     """The commands; an empty argument is refused before any of them runs."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Refuse an unknown command, with the nearest that exists."""
+        name = args[0]
+        if name not in self.commands:
+            near = get_close_matches(name, self.commands) or self.commands
+            ctx.fail(
+                f"No such command '{name}'. Did you mean one of {', '.join(near)}?"
+            )
+        return super().resolve_command(ctx, args)
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:
         """Refuse arguments that are empty or have a null byte."""

@@ -12,15 +12,13 @@ from pathlib import Path
 from rich.text import Text
 
 import shipgym
-from agents.output import locks_and_drafts
 from shipgym.engine.cache import CACHE_VARIABLE, cache_folder
 
 #: Marks and colours of the states of a finding: it works; an optional package is not
-#: installed; something may be removed; something does not work.
+#: installed; something does not work.
 MARKS = {
     "fine": ("ok", "green"),
     "absent": ("absent", "dim"),
-    "left": ("left", "yellow"),
     "wrong": ("wrong", "bold red"),
 }
 
@@ -65,7 +63,6 @@ def examine_installation() -> list[Finding]:
             findings.append(package_finding(f"extra {extra}", names, "absent", remedy))
 
     findings.append(cache_finding())
-    findings += left_findings()
     for name in ("shipgym", "identification", "agents"):
         findings.append(name_finding(name))
     return findings
@@ -123,23 +120,6 @@ def cache_finding() -> Finding:
         )
     size = sum(path.stat().st_size for path in files) / 1e6
     return Finding("cache", "fine", f"{folder}, {len(files)} files, {size:.1f} MB")
-
-
-def left_findings() -> list[Finding]:
-    """Folders in use, and what dead processes left behind.
-
-    Looks here, one level below, and in the cache.
-    """
-    here = Path.cwd()
-    below = sorted(path for path in here.iterdir() if path.is_dir())
-    findings = []
-    for folder in (here, *below, cache_folder()):
-        for description, is_dead in locks_and_drafts(folder):
-            if is_dead:
-                findings.append(Finding("left over", "left", description))
-            else:
-                findings.append(Finding("in use", "fine", description))
-    return findings
 
 
 def name_finding(name: str) -> Finding:

@@ -7,10 +7,6 @@ from pathlib import Path
 
 import pytest
 import wrong_commands
-from rich.text import Text
-
-from agents.cli import terminal
-from agents.cli.tables import plain_table
 
 ROOT = Path(__file__).parents[2]
 SAMPLE = random.Random(0).sample(list(wrong_commands.lines()), 60)
@@ -43,16 +39,3 @@ def test_an_output_that_cannot_be_written_is_told(words):
         answer.stderr
         == "error: the output cannot be written (No space left on device)\n"
     )
-
-
-def test_names_from_files_do_not_steer_the_terminal(capsys):
-    name = "\x1b[31mred\x1b]0;title\x07 [bold]ship[/] :ship: \u202eright to left\x9b2J"
-    table = plain_table(name, name)
-    table.add_row(name, Text(name))
-    for printed in (name, Text(name), table):
-        terminal.console.print(printed, soft_wrap=True)
-    terminal.warn(name)
-    shown = capsys.readouterr()
-    for text in (shown.out, shown.err):
-        assert not {*"\x1b\x07\u202e\x9b"} & {*text}
-        assert "[31mred]0;title [bold]ship[/] :ship: right to left2J" in text
