@@ -34,7 +34,7 @@ SEED = 2018
 Z95 = 1.959963985
 C = 1e6
 OUTLIERS, SIZE = 20, 10.0  # every 20th sample, by 10 standard deviations of the target
-SEARCHES, SEEDS = ("abc", "pso", "de"), 10
+SEARCHES, SEEDS = ("abc", "pso"), 10
 LARGE, SMALL = 2**16, 2**13  # samples
 REPEATS = 10  # of timings, of which the best counts
 
@@ -80,7 +80,7 @@ REQUIREMENTS = (
         " the propeller.",
         (
             "tests/identification/test_requirements.py::test_every_term_of_the_chosen_models_has_a_meaning",
-            "tests/shipgym/test_structures.py::test_printed_structures_have_the_terms_of_their_papers",
+            "tests/identification/test_structures.py::test_a_ship_of_each_structure_is_recovered",
         ),
         ("zhu2018, Tables 7.4.5 to 7.4.7",),
     ),

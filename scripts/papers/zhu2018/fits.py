@@ -19,13 +19,12 @@ from identification.estimators.lssvm import LSSVM
 from identification.estimators.tuned import TunedLSSVM
 from identification.samples.samples import Samples, build_samples
 from shipgym.models import ShipModel
-from shipgym.ships import get_structure
+from shipgym.ships import Structure, get_structure
 from shipgym.ships.structures import own_structure
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 
-STEERING = "steering7"
 PREFIX = {"v": "b", "r": "c"}
 LEAST_C = 1e-2  # of the searches, as printed
 #: Upper bounds of the searches; not printed, but its degenerate objective drives C to
@@ -39,6 +38,8 @@ SEARCHES = {
     "ABC": ("abc", "training"),
 }
 
+SEVEN = get_structure("steering7")
+
 #: The seven terms with the speed of the moment in them, so that they follow the loss of
 #: speed in a turn, two cubic ones, and surge to know that speed: resistance, and a
 #: thrust that falls with the advance ratio.
@@ -46,9 +47,7 @@ STEERING_WITH_SPEED = "U v, |v| v, |r| v, U r, |v| r, |r| r, U^2 delta, v^2 r/U,
 WITH_SPEED = own_structure(
     {
         "name": "zhu-with-speed",
-        "source": (
-            f"{get_structure(STEERING).source}, with the instantaneous speed, and surge"
-        ),
+        "source": (f"{SEVEN.source}, with the instantaneous speed, and surge"),
         "equations": {
             "u": "u^2, v r, n^2, n u",
             "v": STEERING_WITH_SPEED,
@@ -100,10 +99,10 @@ def steering_terms(trial: Trial) -> Floats:
     return np.column_stack(terms)
 
 
-def term_columns(structure: str, equation: str) -> list[int]:
+def term_columns(structure: Structure, equation: str) -> list[int]:
     """Which of the seven terms a reduced structure has."""
-    seven = get_structure(STEERING).names(equation)
-    return [seven.index(name) for name in get_structure(structure).names(equation)]
+    seven = SEVEN.names(equation)
+    return [seven.index(name) for name in structure.names(equation)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +140,7 @@ def steering_fit(
     trial: Trial,
     equation: str,
     estimator: LSSVM | TunedLSSVM,
-    structure: str = STEERING,
+    structure: Structure = SEVEN,
     change: bool = False,
 ) -> Difference:
     """Fit the difference equation of sway or yaw.
@@ -153,7 +152,7 @@ def steering_fit(
     equation : {"v", "r"}
     estimator : LSSVM or TunedLSSVM
         Not fitted.
-    structure : str
+    structure : Structure
         `steering7`, or one with some of its terms.
     change : bool
         Whether x(k+1) - x(k) is the target, and not x(k+1).
@@ -166,7 +165,7 @@ def steering_fit(
     terms = steering_terms(trial)[:-1, columns]
     x = trial[equation]
     fitted = estimator.fit(terms, np.diff(x) if change else x[1:])
-    gains = np.zeros(len(get_structure(STEERING).names(equation)))
+    gains = np.zeros(len(SEVEN.names(equation)))
     gains[columns] = fitted.coef_
     return Difference(gains.tolist(), fitted.intercept_, float(change), fitted)
 

@@ -7,6 +7,7 @@ the state on.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -25,6 +26,7 @@ from papers.zhu2018.container_ship import (
 )
 from papers.zhu2018.fits import (
     PREFIX,
+    SEVEN,
     Difference,
     mean_square,
     search,
@@ -35,6 +37,8 @@ from papers.zhu2018.fits import (
 )
 from papers.zhu2018.ships import INTERVAL, ship, zigzag_trial
 from shipgym.models import ShipModel
+from shipgym.ships import Structure
+from shipgym.ships.structures import own_structure
 from shipgym.trials.trial import Trial
 
 AIM = {"v": 0.02, "r": 0.005}  # of the chosen pair
@@ -128,9 +132,20 @@ class NomotoFit:
     error: float
 
 
-def structure_of(row: int) -> str:
-    """Name of the structure of a row of the tables."""
-    return f"zhu-{row}"
+@cache
+def structure_of(row: int) -> Structure:
+    """The structure that has the terms printed in a row of the tables."""
+    equations = {}
+    for q in PREFIX:
+        terms = dict(printed_coefficients(q))[row]
+        apart = [re.sub(r"(\|\w\|)", r"\1 ", term) for term in terms]
+        equations[q] = ", ".join(apart)
+    table = {
+        "name": f"zhu-{row}",
+        "source": f"{SEVEN.source}, row {row} of Tables 7.4.9 and 7.4.10",
+        "equations": equations,
+    }
+    return own_structure(table, "zhu2018")
 
 
 def printed_coefficients(equation: str) -> Iterator[tuple[int, dict[str, float]]]:
