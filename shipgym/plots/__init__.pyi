@@ -4,8 +4,6 @@ from .manoeuvres import speed_figure as speed_figure
 from .manoeuvres import spiral_figure as spiral_figure
 from .manoeuvres import turning_figure as turning_figure
 from .manoeuvres import zigzag_figure as zigzag_figure
-from .style import GRID as GRID
-from .style import INK as INK
 from .style import LIMIT as LIMIT
 from .style import MEASURED as MEASURED
 from .style import MODEL as MODEL
@@ -15,12 +13,10 @@ from .style import Panel as Panel
 from .style import axis as axis
 from .style import compact as compact
 from .style import graph_objects as graph_objects
-from .style import layout as layout
 from .style import line as line
 from .style import line_styles as line_styles
 from .style import panels as panels
 from .style import points as points
-from .style import subplots as subplots
 from .style import translucent as translucent
 from .trials import CHANNEL_AXES as CHANNEL_AXES
 from .trials import history_figure as history_figure

@@ -34,17 +34,6 @@ def _plotly(module: str) -> Any:
     return library(f"plotly.{module}", "report", "figures and reports need it")
 
 
-def subplots(
-    rows: int, columns: int, titles: Sequence[str] = (), **settings: Any
-) -> Figure:
-    """A figure of panels, rows by columns, with a title above each where given."""
-    figure = _plotly("subplots").make_subplots(
-        rows=rows, cols=columns, subplot_titles=list(titles) or None, **settings
-    )
-    figure.update_annotations(font={"size": 12.5, "color": INK})
-    return figure
-
-
 class Panel(NamedTuple):
     """A part of a figure."""
 
@@ -76,15 +65,28 @@ def panels(
     settings = {"vertical_spacing": 0.36 / max(rows, 2)}
     if grid is not None:
         settings |= grid
-    figure = subplots(rows, columns, titles if is_titled else (), **settings)
+    figure = _plotly("subplots").make_subplots(
+        rows=rows,
+        cols=columns,
+        subplot_titles=titles if is_titled else None,
+        **settings,
+    )
+    figure.update_annotations(font={"size": 12.5, "color": INK})
 
     # as plain dicts, since plotly checks a whole figure faster than one change after
     # the other
     drawn = figure.layout.to_plotly_json()
-    axes = _outer_axes(shown, rows, columns) if outer else _axes(shown)
-    for name, settings in axes.items():
-        drawn[name] |= settings
-    drawn |= layout(height, titled=is_titled, **changes)
+    for k, panel in enumerate(shown):
+        number = _axis_number(k)
+        x = _axis(panel.x)
+        y = _axis(panel.y)
+        if outer and k < columns * (rows - 1):
+            x["title"] = {"text": ""}
+        if outer and k % columns:
+            y["title"] = {"text": ""}
+        drawn[f"xaxis{number}"] |= x
+        drawn[f"yaxis{number}"] |= y
+    drawn |= _layout(height, titled=is_titled, **changes)
     figure.layout = plain_texts(drawn)
     figure.add_traces([plain_texts(trace) for trace in _placed_traces(shown)])
     return figure
@@ -107,31 +109,6 @@ def plain_texts(part: Any) -> Any:
     if isinstance(part, list | tuple):
         return [plain_texts(value) for value in part]
     return part
-
-
-def _axes(shown: Sequence[Panel]) -> dict[str, dict[str, Any]]:
-    """Axes of panels, by their names in a layout."""
-    axes = {}
-    for k, panel in enumerate(shown):
-        number = _axis_number(k)
-        axes[f"xaxis{number}"] = _axis(panel.x)
-        axes[f"yaxis{number}"] = _axis(panel.y)
-    return axes
-
-
-def _outer_axes(
-    shown: Sequence[Panel], rows: int, columns: int
-) -> dict[str, dict[str, Any]]:
-    """Axes of panels, titles below the last row and next to the first column only."""
-    axes = _axes(shown)
-    in_last_row = columns * (rows - 1)
-    for k in range(len(shown)):
-        number = _axis_number(k)
-        if k < in_last_row:
-            axes[f"xaxis{number}"]["title"] = {"text": ""}
-        if k % columns:
-            axes[f"yaxis{number}"]["title"] = {"text": ""}
-    return axes
 
 
 def _axis_number(k: int) -> str:
@@ -161,7 +138,7 @@ def _placed_traces(shown: Sequence[Panel]) -> list[dict[str, Any]]:
     return traces
 
 
-def layout(
+def _layout(
     height: int, *, titled: bool = False, left: int = 62, **changes: Any
 ) -> dict[str, Any]:
     """The layout that all figures share: white, a light grid, the legend above.
