@@ -60,9 +60,7 @@ from shipgym.engine.tiles import (
 )
 
 SIGNATURE = "int64(float64[::1], float64[::1], int64, int64)"
-STEP, STEP_AND_BEGIN, BEGIN, BEGIN_NEXT, OBSERVE = range(
-    5
-)  # what `run` may be asked for
+STEP, STEP_AND_BEGIN, BEGIN, BEGIN_NEXT = range(4)  # what `run` may be asked for
 REFUSED = -1  # answer of a step to commands that are not finite
 # number of the draw of an episode's ship, apart from those of its task
 SHIP_DRAW = np.uint64(1 << 40)
@@ -80,8 +78,7 @@ def run(memory: Any, output_memory: Any, share: int, asked: int) -> int:
         Number of the share, whose thread this is.
     asked : int
         `STEP`; `STEP_AND_BEGIN`, in which lanes whose episode was over do not stay as
-        they are, but begin the next one; `BEGIN` or `BEGIN_NEXT` in the chosen lanes;
-        `OBSERVE`, after numbers of the state were written.
+        they are, but begin the next one; `BEGIN` or `BEGIN_NEXT` in the chosen lanes.
 
     Returns
     -------
@@ -95,9 +92,6 @@ def run(memory: Any, output_memory: Any, share: int, asked: int) -> int:
     if asked >= BEGIN:
         for number in range(at.states.rows):
             tile = tile_of(memory, at, share, number)
-            if asked == OBSERVE:
-                observe_lanes(tile, outputs)
-                continue
             begin_lanes(tile, outputs, chosen, asked == BEGIN_NEXT)
         return 0
 
@@ -123,14 +117,6 @@ def run(memory: Any, output_memory: Any, share: int, asked: int) -> int:
             choose_ended(tile, chosen)
             begin_lanes(tile, outputs, chosen, asked == STEP_AND_BEGIN)
     return n_ended
-
-
-@called
-def observe_lanes(tile: Tile, outputs: OutputTables) -> None:
-    """Observe the ships of a tile, and write their outputs."""
-    for lane in range(tile.lanes):
-        observe_lane(tile, lane)
-        write_outputs(tile, outputs, lane, lane + 1)
 
 
 def choose_ended(tile: Tile, chosen: Any) -> None:

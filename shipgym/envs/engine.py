@@ -14,7 +14,7 @@ from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_number, check_whole
 from shipgym.engine.compiling import entry_of
 from shipgym.engine.episode_program import EpisodeProgram, episode_program
-from shipgym.engine.episodes import BEGIN, BEGIN_NEXT, OBSERVE, STEP, STEP_AND_BEGIN
+from shipgym.engine.episodes import BEGIN, BEGIN_NEXT, STEP, STEP_AND_BEGIN
 from shipgym.engine.records import LANES
 from shipgym.envs.lanes import Contents, Lanes
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES
@@ -147,11 +147,11 @@ class Engine(Lanes):
         InputError for another state.
         """
         self.check_state(state)
-        self.remember(state)
+        self._states[:] = state["states"]
+        self._random[:] = state["random"]
+        self._ships[:] = state["ships"]
         self.renew_outputs()
-        self.outputs.observations[:] = state["observations"]
-        self.outputs.outcomes[:] = state["outcomes"]
-        self.outputs.flags[:] = state["flags"]
+        self.outputs.memory[:] = state["outputs"]
 
     def advance(self, begin_ended: bool = False, anew: bool = False) -> int:
         """Take one control interval with the commands as they stand.
@@ -251,15 +251,6 @@ class Engine(Lanes):
         self._begin(chosen, BEGIN_NEXT)
         outputs.outcomes[:ANSWER_OUTCOMES] = answer
         outputs.flags[:ANSWER_FLAGS] = ends
-
-    def observe_again(self) -> None:
-        """Observe after numbers of the state were written; nothing else changes."""
-        outputs = self.outputs
-        outcomes = outputs.outcomes.copy()
-        flags = outputs.flags.copy()
-        self._run(self._memory, outputs.memory, 0, OBSERVE)
-        outputs.outcomes[:] = outcomes
-        outputs.flags[:] = flags
 
     def _begin(self, chosen: Flags, asked: int) -> None:
         self._chosen[:] = chosen

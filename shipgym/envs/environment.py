@@ -107,45 +107,20 @@ def spaces(task: Task, model: ShipModel) -> tuple[Any, Space]:
 def given_orders(
     orders: Sequence[NDArray[np.float32]],
     numbers: Any,
-    shape: tuple[int, ...],
+    space: gymnasium.Space[Any],
     where: str,
 ) -> NDArray[np.float32]:
     """Discrete orders by their numbers, a column for each command.
 
-    `shape` is that of the rows. InputError for other numbers, or another shape.
+    InputError for numbers that are not in the action space.
     """
     array = as_array(numbers)
-    if len(orders) > 1:
-        shape = (*shape, len(orders))
-    is_whole = array.shape == shape and array.dtype.kind in "iu"
-    if not is_whole or array.min() < 0 or _is_beyond(array, orders):
-        raise unexpected(where, _orders_in_words(orders, shape), numbers)
-    if len(orders) == 1:
-        one: NDArray[np.float32] = orders[0][array.reshape(-1, 1)]
-        return one
+    if array not in space:
+        kind = "rudder orders" if len(orders) == 1 else "orders of rudder and shaft"
+        raise unexpected(where, f"a member of {space}: {kind}", numbers)
     columns = array.reshape(-1, len(orders)).T
     ordered = [known[chosen] for known, chosen in zip(orders, columns, strict=True)]
     return np.stack(ordered, axis=-1)
-
-
-def _is_beyond(numbers: NDArray[Any], orders: Sequence[NDArray[np.float32]]) -> bool:
-    """Return whether a number is beyond the orders of its command."""
-    counts = [len(known) for known in orders]
-    if len(counts) == 1:  # in every step of a ship
-        return bool(numbers.max() >= counts[0])
-    is_beyond = numbers >= counts
-    return bool(is_beyond.any())
-
-
-def _orders_in_words(
-    orders: Sequence[NDArray[np.float32]],
-    shape: tuple[int, ...],
-) -> str:
-    last = " and ".join(f"0 to {len(known) - 1}" for known in orders)
-    if not shape:
-        return f"an integer from {last}: a rudder order"
-    kind = "rudder orders" if len(orders) == 1 else "orders of rudder and shaft"
-    return f"integers of shape {shape} from {last}: {kind}"
 
 
 class ShipsEnv:
@@ -286,15 +261,8 @@ class ShipsEnv:
         Raises InputError for a state of another task, version, ship or number of ships,
         or one with a number that is not finite; nothing is changed then.
         """
-        counters = self._counters()
-        names = ("asked", "engine", *counters)
+        names = ("asked", "engine", *self._counters())
         check_table(state, "state", names, required=names)
-        for name in counters:
-            counter = np.asarray(state[name])
-            if counter.dtype.kind not in "biu":
-                expected = "integers, as `get_state` gave them"
-                raise unexpected(f"state: {name}", expected, state[name])
-
         settings = self.task.definition.settings
         asked = check_table(state["asked"], "state: asked", settings)
         engine = self._engine_for(asked)

@@ -322,21 +322,25 @@ class Lanes:
 
     def get_state(self) -> dict[str, Any]:
         """Return all that `set_state` needs to continue from here, copies by name."""
+        return {
+            "made_for": self._made_for(),
+            "states": self._states.copy(),
+            "random": self._random.copy(),
+            "ships": self._ships.copy(),
+            "outputs": self.outputs.memory.copy(),
+        }
+
+    def _made_for(self) -> dict[str, Any]:
+        """What a state fits."""
         rows = []
         for name, record in self.program.state_rows.rows.items():
             rows += [f"{name}.{path}" for path in record.present]
-        made_for = {
+        return {
             "task": self.task.name,
             "model": self.model.name,
             "num_envs": self.num_envs,
             "rows": rows,
-        }
-        return {
-            "made_for": made_for,
-            **self.memory(),
-            "observations": self.outputs.observations.copy(),
-            "outcomes": self.outputs.outcomes.copy(),
-            "flags": self.outputs.flags.copy(),
+            "numbers of the state": self._states.shape[1],
         }
 
     def check_state(self, state: Mapping[str, Any]) -> None:
@@ -344,64 +348,20 @@ class Lanes:
 
         InputError names the difference.
         """
-        own = self.get_state()
-        check_table(state, "state", own, required=own)
-        expected_rows = own["made_for"]["rows"]
-        _check_made_for(state["made_for"], own.pop("made_for"))
-        for name, expected in own.items():
-            if np.shape(state[name]) != np.shape(expected):
+        names = ("made_for", "states", "random", "ships", "outputs")
+        check_table(state, "state", names, required=names)
+        found = check_table(state["made_for"], "state: made_for")
+        for name, expected in self._made_for().items():
+            if found.get(name) != expected:
                 raise InputError(
-                    f"state: {name}: expected shape {np.shape(expected)}, got"
-                    f" {np.shape(state[name])}"
+                    f"state: {name}: expected {shown(expected)}, got"
+                    f" {shown(found.get(name))}: a state fits an environment made by"
+                    " the same arguments in the same version"
                 )
-
         same_ship = np.array_equal(state["ships"], self._ships, equal_nan=True)
         if self.program.shared and not same_ship:
             raise InputError(
                 f"state: expected that of this {self.model.name!r}, got another ship's"
-            )
-        self._check_finite(state, expected_rows)
-
-    def _check_finite(self, state: Mapping[str, Any], rows: Sequence[str]) -> None:
-        """Refuse numbers that are not finite in the lanes that hold ships."""
-        by_lane = np.moveaxis(lanes_of(state["states"]), 1, 2)
-        n_rows = by_lane.shape[-1]
-        lanes = by_lane.reshape(-1, n_rows)[: self.num_envs]
-        wrong = np.argwhere(~np.isfinite(lanes))
-        if len(wrong):
-            lane, row = wrong[0]
-            name = rows[row] if row < len(rows) else "plan"
-            raise InputError(
-                f"state: {name}: expected finite numbers, got none in row {lane}"
-            )
-        if not np.isfinite(state["observations"]).all():
-            raise InputError("state: observations: expected finite numbers")
-
-    def memory(self) -> dict[str, NDArray[Any]]:
-        """Return all on which later steps depend, except commands; copies by name."""
-        return {
-            "states": self._states.copy(),
-            "keys": self._random.copy(),
-            "ships": self._ships.copy(),
-        }
-
-    def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
-        """Continue from the `memory` of this engine, or one with the same arguments."""
-        self._states[:] = memory["states"]
-        self._random[:] = memory["keys"]
-        self._ships[:] = memory["ships"]
-
-
-def _check_made_for(given: Any, made_for: Mapping[str, Any]) -> None:
-    """Refuse a state that was made for another task, ship or number of ships."""
-    table = check_table(given, "state: made_for")
-    for name, expected in made_for.items():
-        found = table.get(name)
-        if found != expected:
-            raise InputError(
-                f"state: {name}: expected {shown(expected)}, got {shown(found)}: a"
-                " state fits an environment made by the same arguments in the same"
-                " version"
             )
 
 

@@ -4,7 +4,7 @@ It takes none of Gymnasium's vector environments.
 """
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -181,25 +181,6 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
             "t": round(time.time() - self._started, 6),
         }
         return info
-
-    def memory(self) -> dict[str, NDArray[Any]]:
-        """Return all on which later steps depend, except actions; copies by name.
-
-        Only after a `reset`.
-        """
-        own = {"returns": self._returns.copy(), "lengths": self._lengths.copy()}
-        return own | self._ships.memory()
-
-    def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
-        """Continue from the `memory` of an environment with the same arguments.
-
-        It replaces a `reset`.
-        """
-        self._returns[:] = memory["returns"]
-        self._lengths[:] = memory["lengths"]
-        self._ships.remember(memory)
-        self.reset_infos = [{} for _ in self._rows]
-        self._forget_infos()
 
     def close(self) -> None:
         """Close the vector environment."""

@@ -94,6 +94,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         self._observation = engine.outputs.observations[0]
         self._outcomes = engine.outputs.outcomes[:, 0]
         self._command = engine.command[:, 0]
+        self._shape = self._command.shape
         self._advance = engine.step_of_one()
 
     @property
@@ -217,18 +218,15 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
 
     def _order(self, action: Any) -> None:
         """Set the command; InputError for an invalid action."""
-        # as in the action space: its numbers need no check
-        is_array = isinstance(action, np.ndarray) and action.dtype is FLOAT32
         if self._orders:
-            action = given_orders(self._orders, action, (), "action")[0]
-        elif not is_array:
+            action = given_orders(self._orders, action, self.action_space, "action")[0]
+        # as in the action space: its numbers need no check
+        elif not (isinstance(action, np.ndarray) and action.dtype is FLOAT32):
             action = as_numbers(action, "action")
-        if action.shape != self._command.shape:
-            commands = "the commanded rudder"
-            if len(self._command) > 1:
-                commands += " and shaft speed"
+        if action.shape != self._shape:
+            commands = "a number for each command"
             raise InputError(
-                f"action: expected shape {self._command.shape}, {commands}, got shape"
+                f"action: expected shape {self._shape}, {commands}, got shape"
                 f" {action.shape}"
             )
         self._command[...] = action

@@ -245,7 +245,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         if self._keeps_ends and self._over.any():
             self._refuse_over()
         if self._orders:
-            actions = given_orders(self._orders, actions, (self.num_envs,), "actions")
+            actions = given_orders(self._orders, actions, self.action_space, "actions")
         engine = self._engine
         engine.order(actions)
         n_ended = engine.advance(self._some_over, anew=True)
@@ -302,22 +302,6 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
     def write(self, name: str, values: Any) -> None:
         """Write one number of the state in all rows (see `Engine.write`)."""
         self._engine.write(name, values)
-
-    def memory(self) -> dict[str, NDArray[Any]]:
-        """Return all on which later steps depend, except commands; copies by name.
-
-        Only after a `reset`.
-        """
-        return self._counters() | self._engine.memory()
-
-    def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
-        """Continue from the `memory` of an environment with the same arguments.
-
-        It replaces a `reset`.
-        """
-        self._begun = True
-        self._recall(memory)
-        self._engine.remember(memory)
 
     def physical_state(self) -> dict[str, Floats]:
         """State, set-point and weather by name, SI units, each of shape (num_envs,)."""

@@ -3,7 +3,6 @@ and actions."""
 
 import math
 import warnings
-from dataclasses import replace
 
 import gymnasium
 import numpy as np
@@ -158,37 +157,6 @@ def test_wrong_actions_are_refused_and_change_nothing(name, action, message):
         rows.step(np.array([action, action], dtype=np.float32))
 
 
-RAGGED = [[0.0], [0.0, 1.0]]
-
-
-@pytest.mark.parametrize("name", [COURSE, "shipgym/CourseKeepingDiscrete-v0"])
-@pytest.mark.parametrize(
-    "action",
-    [
-        "left",
-        "0.5",
-        ["0.5"],
-        np.array([0.5], dtype=object),
-        [None],
-        [1j],
-        {"rudder": 0},
-        RAGGED,
-        b"0",
-    ],
-)
-def test_texts_objects_and_complex_numbers_are_no_actions(name, action):
-    env, rows = (
-        gymnasium.make(name, model="mariner").unwrapped,
-        gymnasium.make_vec(name, 1, model="mariner"),
-    )
-    for one, given in ((env, action), (rows, action), (rows, [action])):
-        one.reset(seed=0)
-        before = one.physical_state()
-        with pytest.raises(InputError, match=r"actions?: "):
-            one.step(given)
-        assert one.physical_state() == before
-
-
 @pytest.mark.parametrize("name", [COURSE, "shipgym/CourseKeepingDiscrete-v0"])
 def test_a_step_before_the_reset_or_after_the_end_is_refused(name):
     for env in (gymnasium.make(name).unwrapped, gymnasium.make_vec(name, 2)):
@@ -200,19 +168,6 @@ def test_a_step_before_the_reset_or_after_the_end_is_refused(name):
         env.close()
         with pytest.raises(InputError, match="was closed; call reset first"):
             env.step(action)
-
-
-def test_wrong_actions_of_rudder_and_shaft():
-    env = gymnasium.make(PATH, model="kvlcc2", action="rudder-shaft").unwrapped
-    env.reset(seed=0)
-    with pytest.raises(
-        InputError, match=r"expected shape \(2,\), .* and shaft speed, got shape \(1,\)"
-    ):
-        env.step(np.zeros(1, dtype=np.float32))
-    with pytest.raises(
-        InputError, match=r"action: expected finite numbers in .* nan\]"
-    ):
-        env.step(np.array([0.0, np.nan], dtype=np.float32))
 
 
 @pytest.mark.parametrize(
@@ -295,15 +250,6 @@ def test_wrong_options_are_named_when_an_environment_is_made(options, message):
         gymnasium.make_vec(COURSE, 2, **{"model": "mariner", **options})
 
 
-@pytest.mark.parametrize("count", [0, -1, 2.5, True])
-def test_a_count_that_is_none(count):
-    with pytest.raises(
-        InputError,
-        match="num_envs: expected an integer of at least 1",
-    ):
-        gymnasium.make_vec(PATH, count, model="mariner")
-
-
 def test_a_ship_without_a_rudder_is_refused(monkeypatch):
     monkeypatch.setattr("shipgym.ships.structures.REGISTERED_STRUCTURES", {})
     shipgym.register_structure("drifting", {"v": "v, |v| v", "r": "v, r"})
@@ -320,18 +266,6 @@ def test_a_ship_without_a_rudder_is_refused(monkeypatch):
             InputError, match=r"model: expected .* rudder, got 'drifting'"
         ):
             gymnasium.make(name, model=drifting)
-
-
-def test_weather_needs_the_size_of_a_ship():
-    mariner = shipgym.load_model("mariner")
-    bare = replace(
-        mariner, particulars=replace(mariner.particulars, beam=None, draught=None)
-    )
-    assert gymnasium.make(COURSE, model=bare).reset(seed=0)
-    with pytest.raises(
-        InputError, match="weather without the particulars it needs: beam, draught"
-    ):
-        gymnasium.make(COURSE, model=bare, sea="moderate")
 
 
 def test_reset_says_what_is_wrong():

@@ -12,25 +12,18 @@ import pytest
 
 import shipgym
 from shipgym import InputError
-from shipgym.engine.motion import Motion
-from shipgym.envs.randomisation import N_SPEEDS, POOL_SIZE, Randomisation
-from shipgym.envs.registration import ENVIRONMENTS, env_id, register_environments
-from shipgym.instruments import bridge, perfect
-from shipgym.instruments.sensor_set import read_sensors, shipped_sensors
+from shipgym.envs.randomisation import N_SPEEDS, POOL_SIZE
 from shipgym.sea import Waves, Weather, Wind
-from shipgym.sea.open_sea import Sea
 from shipgym.ships import Envelope
-from shipgym.tasks.contract import Interval, Random
 from shipgym.tasks.definition import read_definition
 from shipgym.tasks.scales import rounded_interval
 from shipgym.tasks.steering import ROLL_SCALE
-from shipgym.tasks.task import RUDDER_ORDERS, Task, course_keeping_task
+from shipgym.tasks.task import RUDDER_ORDERS, course_keeping_task
 from shipgym.trials.sensors import SEA_TRIAL
 
 pytestmark = pytest.mark.interpreted
 
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
-SHAFT = {"model": "kvlcc2", "action": "rudder-shaft"}
 UNBOUND = {"course_change_deg": 0.0, "max_heading_error_deg": 180.0}
 
 
@@ -93,52 +86,6 @@ def test_noise_has_the_deviation_of_a_sea_trials_sensors(noise):
     )
 
 
-@pytest.mark.compiled
-def test_noise_of_the_position_shows_in_the_cross_track_error():
-    count, env = (
-        4000,
-        many(4000, PATH, **SHAFT, noise=2.0, waypoints=[[0.0, 0.0], [5000.0, 1000.0]]),
-    )
-    env.reset(seed=0)
-    seen, *_, infos = env.step(idle(env))
-    k = env.observation_names.index("cross_track")
-    wrong = seen[:, k] * env.observation_scales[k] - infos["cross_track"]
-    assert np.std(wrong) == pytest.approx(
-        2.0 * SEA_TRIAL["x"].noise, rel=5.0 / np.sqrt(2 * count)
-    )
-
-
-@pytest.mark.compiled
-def test_the_course_to_steer_is_that_of_the_position_shown():
-    """So satellite noise reaches it: what remains of the heading error's noise is the
-    compass's alone."""
-    count, lookahead, length = 4000, 0.2, 160.93
-    env = many(
-        count,
-        PATH,
-        noise=2.0,
-        lookahead=lookahead,
-        waypoints=[[0.0, 0.0], [-3000.0, 4000.0]],
-    )
-    env.reset(seed=0)
-    seen, *_, infos = env.step(idle(env))
-    shown = dict(
-        zip(env.observation_names, (seen * env.observation_scales).T, strict=True)
-    )
-    wrong = (
-        np.arctan2(shown["heading_error_sin"], shown["heading_error_cos"])
-        - infos["heading_error"]
-    )
-    ahead = lookahead * length
-    of_position = np.arctan2(infos["cross_track"], ahead) - np.arctan2(
-        shown["cross_track"], ahead
-    )
-    margin = 5.0 / np.sqrt(2 * count)
-    assert np.std(of_position) > np.std(wrong - of_position)
-    compass = 2.0 * SEA_TRIAL["psi"].noise
-    assert np.std(wrong - of_position) == pytest.approx(compass, rel=margin)
-
-
 def test_noise_is_only_shown_and_none_is_none():
     plain, none, noisy = (
         make(**options) for options in ({}, {"noise": 0.0}, {"noise": 2.0})
@@ -182,37 +129,6 @@ def test_a_filter_takes_most_of_the_waves_out_of_what_is_shown():
     assert rate < 0.2
     assert heading < 0.25
     assert waves_shown("raw") == pytest.approx([1.0, 1.0], rel=1e-6)
-
-
-@pytest.mark.compiled
-def test_a_filter_keeps_slow_motion():
-    """Rudder to and fro in 120 s, in waves too low to matter: the yaw rate comes
-    through, a little late."""
-    env = many(
-        64,
-        sea=Weather(waves=Waves(0.01, 9.0)),
-        measurement="filtered",
-        noise=1e-6,
-        **UNBOUND,
-    )
-    env.reset(seed=1)
-    wrong, so = [], []
-    for k in range(360):
-        order = np.full((64, 1), 0.2 * np.sin(2 * np.pi * k / 120.0), dtype=np.float32)
-        wrong.append(misreadings(env, env.step(order)[0])["yaw_rate"])
-        so.append(env.physical_state()["r"])
-    wrong, so = np.array(wrong)[120:], np.array(so)[120:]
-    assert np.std(wrong + so) == pytest.approx(np.std(so), rel=0.02)
-    assert np.std(wrong) < 0.15 * np.std(so)
-
-
-def test_in_calm_water_a_filter_has_nothing_to_do():
-    seen = []
-    for measurement in ("raw", "filtered"):
-        env = make(measurement=measurement)
-        env.reset(seed=2)
-        seen.append([env.step(np.array([0.5], dtype=np.float32))[0] for _ in range(30)])
-    np.testing.assert_array_equal(*seen)
 
 
 def test_roll_is_observed_and_priced_where_it_is_asked_for():
@@ -476,39 +392,6 @@ def test_ranges_that_are_none_are_refused(options, message):
         make(**options)
 
 
-def test_an_approach_speed_turns_the_shaft_and_load_divides_what_forces_do():
-    tanker, mariner = shipgym.load_model("tanker"), shipgym.load_model("mariner")
-    slower = Randomisation(speed_range=(0.5, 0.9)).ships(tanker, [Weather()])
-    parts = (
-        np.array([ship.particulars["speed"] for ship, _ in slower])
-        / tanker.particulars["speed"]
-    )
-    shafts = (
-        np.array([ship.service_shaft_speed for ship, _ in slower])
-        / tanker.service_shaft_speed
-    )
-    np.testing.assert_allclose(shafts, parts)
-    np.testing.assert_allclose(
-        np.unique(parts.round(9)), np.linspace(0.5, 0.9, N_SPEEDS)
-    )
-    loaded = [
-        ship
-        for ship, _ in Randomisation(loading_range=(0.8, 1.25)).ships(
-            mariner, [Weather()]
-        )
-    ]
-    loads = np.array(
-        [mariner.coefficients["N_d"] / ship.coefficients["N_d"] for ship in loaded]
-    )
-    assert len(loaded) == POOL_SIZE
-    assert 0.8 <= loads.min() < 0.82
-    assert 1.23 < loads.max() <= 1.25
-    for ship, load in zip(loaded[:3], loads, strict=False):
-        assert ship.coefficients == pytest.approx(
-            {k: v / load for k, v in mariner.coefficients.items()}
-        )
-
-
 PAGES = Path(__file__).parents[2] / "docs" / "environments"
 
 
@@ -547,37 +430,6 @@ def test_observations_have_the_bounds_of_their_page(name, page, count):
     assert own.keys() == found.keys() | documented("course_keeping").keys()
 
 
-def test_scales_of_roll_and_shaft_are_those_of_their_page():
-    tanker, container = shipgym.load_model("tanker"), shipgym.load_model("container")
-    seen = {
-        one.name: one
-        for one in Task.of("CourseKeeping", action="rudder-shaft").observed(tanker)
-    }
-    assert (
-        seen["shaft_speed"].scale
-        == seen["last_shaft_command"].scale
-        == tanker.service_shaft_speed
-    )
-    assert "roll" not in seen
-    rolls = {
-        one.name: one.scale
-        for one in Task.of("CourseKeeping", roll=True).observed(container)
-    }
-    assert (rolls["roll"], rolls["roll_rate"]) == (pytest.approx(np.pi / 6), 0.1)
-    assert "last_shaft_command" not in rolls
-
-
-def test_scales_of_a_path_are_those_of_its_page():
-    mariner = shipgym.load_model("mariner")
-    length = mariner.particulars["length"]
-    observed = Task.of("PathFollowing", corridor=0.5).observed(mariner)
-    scales = {one.name: one.scale for one in observed}
-    assert scales["cross_track"] == pytest.approx(0.5 * length)
-    for turn in ("next_turn", "second_turn"):
-        assert scales[f"{turn}_distance"] == pytest.approx(20.0 * length)
-        assert scales[f"{turn}_angle"] == pytest.approx(np.pi)
-
-
 @pytest.mark.parametrize(
     ("travel_s", "interval"),
     [
@@ -600,28 +452,6 @@ def test_a_control_interval_is_about_a_twentieth_of_the_time_a_length_takes(
     assert rounded_interval(travel_s) == pytest.approx(interval)
 
 
-def test_an_interval_is_integrated_in_steps_of_at_most_one_and_a_half_usual_ones():
-    mariner = shipgym.load_model("mariner")
-    for dt, steps in (
-        (None, 1),
-        (0.25, 1),
-        (1.0, 1),
-        (1.5, 1),
-        (1.51, 2),
-        (3.0, 2),
-        (3.01, 3),
-        (30.0, 20),
-    ):
-        task = course_keeping_task(dt=dt)
-        assert task.interval(mariner) == (dt or 1.0)
-        assert task.substeps(mariner) == steps
-        assert task.substep(mariner) == pytest.approx((dt or 1.0) / steps)
-    tanker = shipgym.load_model("kvlcc2")  # whose usual interval is 2 s
-    assert [
-        course_keeping_task(dt=dt).substeps(tanker) for dt in (None, 3.0, 3.01, 6.0)
-    ] == [1, 1, 2, 2]
-
-
 def test_an_interval_is_at_most_five_ship_lengths():
     mariner = shipgym.load_model("mariner")
     longest = 5.0 * 160.93 / 7.7175
@@ -631,267 +461,3 @@ def test_an_interval_is_at_most_five_ship_lengths():
         match=r"^dt: expected a number <= 104.263 .s: 5 ship lengths., got 104.3$",
     ):
         course_keeping_task(dt=104.3).check_fits(mariner)
-
-
-def test_settings_of_a_task_are_its_attributes_weights_too():
-    task = Task.of("PathFollowing", corridor=0.7, heading_scale_deg=20.0)
-    assert (task.corridor, task.heading_scale_deg, task.turn_radius, task.name) == (
-        0.7,
-        20.0,
-        4.0,
-        "PathFollowing",
-    )
-    with pytest.raises(
-        AttributeError, match="task 'PathFollowing' has no setting 'acceptance'"
-    ):
-        _ = task.acceptance
-    assert task.follows_path
-    assert not course_keeping_task().follows_path
-    assert task.changed(corridor=0.9).corridor == 0.9
-    assert task.changed(ground=5.0).corridor == 0.7
-    assert (
-        task.n_commands,
-        Task.of("PathFollowing", action="rudder-shaft").n_commands,
-    ) == (1, 2)
-
-
-def test_info_has_what_the_task_reports_and_the_parts_of_its_reward():
-    task = course_keeping_task()
-    parts = ("heading", "rudder", "rudder_rate", "roll", "envelope", "end")
-    assert task.reward_parts == tuple(f"reward_{part}" for part in parts)
-    assert task.info_names == (
-        "heading_error",
-        "envelope_distance",
-        "extrapolating",
-        "cost",
-        *task.reward_parts,
-    )
-    assert task.flags == {"extrapolating"}
-    assert Task.of("PathFollowing").flags == {
-        "extrapolating",
-        "success",
-        "in_corridor",
-        "grounded",
-    }
-
-
-def test_ships_and_seas_of_a_pool_go_together_in_all_pairs():
-    mariner = shipgym.load_model("mariner")
-    others = [replace(mariner, name=name) for name in ("second", "third")]
-    seas = [Weather(), Weather(wind=Wind(9.0))]
-    plain = Randomisation(ensemble=others).ships(mariner, seas)
-    assert [(ship.name, seas.index(sea)) for ship, sea in plain] == [
-        (name, k) for name in ("mariner", "second", "third") for k in (0, 1)
-    ]
-    drawn = Randomisation(ensemble=others, speed_range=(0.5, 1.0)).ships(mariner, seas)
-    assert len(drawn) == POOL_SIZE == 256
-    pairs = [(ship.name, seas.index(sea)) for ship, sea in drawn]
-    assert pairs[:6] == [
-        (name, k) for k in (0, 1) for name in ("mariner", "second", "third")
-    ]
-    assert pairs == (pairs[:6] * 43)[:256]
-    again = Randomisation(ensemble=others, speed_range=(0.5, 1.0)).ships(mariner, seas)
-    assert [ship.particulars["speed"] for ship, _ in again] == [
-        ship.particulars["speed"] for ship, _ in drawn
-    ]
-    assert all(ship.coefficients == mariner.coefficients for ship, _ in drawn)
-
-
-def test_options_are_parted_into_what_is_randomised_and_the_rest():
-    randomised, rest = Randomisation.take_from(
-        {"speed_range": (0.5, 1.0), "noise": 1.0}
-    )
-    assert (randomised.speed_range, randomised.loading_range, rest) == (
-        (0.5, 1.0),
-        None,
-        {"noise": 1.0},
-    )
-    assert Randomisation.names() == (
-        "model_uncertainty",
-        "ensemble",
-        "speed_range",
-        "loading_range",
-    )
-
-
-def test_each_task_has_an_id_and_three_variants():
-    ids = [
-        f"shipgym/{task}{variant}-v0"
-        for task in ("CourseKeeping", "PathFollowing")
-        for variant in ("", "Discrete", "Shaft", "Roll")
-    ]
-    assert list(ENVIRONMENTS) == ids
-    assert {env_id("CourseKeeping"), env_id("PathFollowing")} < set(ids)
-    ours = [name for name in gymnasium.registry if name.startswith("shipgym/")]
-    assert ours == ids
-    before = dict(gymnasium.registry)
-    register_environments()  # a second time changes nothing
-    assert gymnasium.registry == before
-
-
-@pytest.mark.parametrize(
-    ("windy", "noise", "filtered", "name"),
-    [
-        (False, False, False, "perfect"),
-        (True, False, False, "bridge"),
-        (False, True, False, "bridge"),
-        (False, False, True, "bridge"),
-        (True, True, True, "bridge"),
-    ],
-)
-def test_instruments_are_without_error_only_in_calm_water_without_noise_and_filter(
-    windy, noise, filtered, name
-):
-    found = shipped_sensors(windy, noise, filtered)
-    assert Path(found.source).stem == name
-    if name == "bridge":
-        assert (found.noise, found.filter) == (noise, filtered)
-    assert read_sensors(found) is found
-
-
-INTERVAL = Interval(0.5, 7.0, 0.0, 0.0, 1.0, 0.0, 0.0)
-WAVES = {"psi_wave": 0.02, "r_wave": 0.003, "phi_wave": 0.04, "p_wave": 0.005}
-SEA = Sea(
-    **dict.fromkeys(Sea._fields, 0.0)
-    | WAVES
-    | {
-        "current_north": 0.6,
-        "current_east": 0.8,
-    }
-)
-NO_NOTCH = bridge.Notch(0.0, 0.0, 0.0, 0.0)
-NO_MEMORY = bridge.Memory(*[0.0] * 6, NO_NOTCH, NO_NOTCH)
-SAILING = Motion(10.0, 20.0, 0.5 * np.pi, 5.0, 0.3, 0.01, 0.02, 0.1, 0.0, 0.2, 1.5)
-
-
-def test_perfect_instruments_show_what_is_so_and_the_way_over_ground():
-    assert (
-        perfect.measure(SAILING, SEA, "memory", 0.5, INTERVAL, None, None) == "memory"
-    )
-    shown = perfect.readings(SAILING, SEA, None)
-    over_ground = (5.0 + 0.8, 0.3 * np.cos(0.1) - 0.6)  # heading east
-    assert (shown.ahead, shown.aside) == pytest.approx(over_ground, abs=1e-12)
-    for name in ("x", "y", "psi", "u", "v", "r", "p", "phi", "delta", "n"):
-        assert getattr(shown, name) == getattr(SAILING, name)
-    assert shown.track_psi == SAILING.psi
-
-
-def test_a_bridge_shows_waves_and_noise_beside_the_slow_motion():
-    memory = bridge.Memory(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, NO_NOTCH, NO_NOTCH)
-    shown, plain = (
-        bridge.readings(SAILING, SEA, memory),
-        perfect.readings(SAILING, SEA, None),
-    )
-    added = {
-        name: getattr(shown, name) - getattr(plain, name) for name in plain._fields
-    }
-    expected = {
-        "x": 1.0,
-        "y": 2.0,
-        "psi": 3.0,
-        "u": 4.0,
-        "v": 5.0,
-        "r": 6.0,
-        "p": 0.005,
-        "phi": 0.04,
-    }
-    assert added == pytest.approx(dict.fromkeys(plain._fields, 0.0) | expected)
-
-
-def test_without_noise_and_filter_a_bridge_adds_the_waves_alone(monkeypatch):
-    monkeypatch.setattr(bridge, "HAS_NOISE", False)
-    monkeypatch.setattr(bridge, "HAS_FILTER", False)
-    found = bridge.measure(
-        SAILING,
-        SEA,
-        NO_MEMORY,
-        0.6,
-        INTERVAL,
-        bridge.Settings(9.0, 9.0, 9.0, 9.0),
-        None,
-    )
-    assert found == NO_MEMORY._replace(psi=0.02, r=0.003)
-
-
-def measured(settings, steps=7.0, key=1):
-    random = Random(np.uint64(key), np.uint64(2))
-    with np.errstate(over="ignore"):
-        return bridge.measure(
-            SAILING,
-            SEA,
-            NO_MEMORY,
-            0.6,
-            INTERVAL._replace(steps=steps),
-            bridge.Settings(**settings),
-            random,
-        )
-
-
-def test_noise_of_each_instrument_is_its_own_and_grows_with_its_deviation(monkeypatch):
-    monkeypatch.setattr(bridge, "HAS_FILTER", False)
-    plain = measured({})
-    assert plain[:6] == (0.0, 0.0, 0.02, 0.0, 0.0, 0.003)
-    shows = {
-        "heading": ("psi",),
-        "yaw_rate": ("r",),
-        "speed": ("u", "v"),
-        "position": ("x", "y"),
-    }
-    drawn = []
-    for setting, channels in shows.items():
-        one, twice = measured({setting: 0.1}), measured({setting: 0.2})
-        for name in plain._fields[:6]:
-            noise = getattr(one, name) - getattr(plain, name)
-            assert getattr(twice, name) - getattr(plain, name) == pytest.approx(
-                2.0 * noise
-            )
-            assert (noise != 0.0) == (name in channels)
-            drawn += [noise] if noise else []
-    assert len(set(drawn)) == 6
-    assert measured({"speed": 0.1}) == measured({"speed": 0.1})
-    assert (
-        len(
-            {
-                measured({"speed": 0.1}, steps, key).u
-                for steps in (0.0, 1.0, 2.0)
-                for key in (1, 2)
-            }
-        )
-        == 6
-    )
-
-
-def test_a_filter_takes_nothing_away_in_the_first_sample(monkeypatch):
-    monkeypatch.setattr(bridge, "HAS_NOISE", False)
-    first = bridge.measure(
-        SAILING,
-        SEA,
-        NO_MEMORY,
-        0.6,
-        INTERVAL._replace(steps=0.0),
-        bridge.Settings(),
-        None,
-    )
-    assert (first.psi, first.r) == (0.02, 0.003)
-    assert first.heading == bridge.Notch(
-        SAILING.psi + 0.02, SAILING.psi + 0.02, 0.0, 0.0
-    )
-    assert first.rate == pytest.approx(bridge.Notch(0.013, 0.013, 0.0, 0.0))
-    later = bridge.measure(SAILING, SEA, first, 0.6, INTERVAL, bridge.Settings(), None)
-    assert later.heading == bridge.notched(
-        SAILING.psi + 0.02, 0.3, False, first.heading
-    )
-    assert later.psi == pytest.approx(0.02 - later.heading.taken_1)
-    changed = SEA._replace(psi_wave=0.05, r_wave=-0.01)
-    later = bridge.measure(
-        SAILING, changed, first, 0.6, INTERVAL, bridge.Settings(), None
-    )
-    assert later.rate == pytest.approx(bridge.notched(0.0, 0.3, False, first.rate))
-    assert later.r == pytest.approx(-0.01 - later.rate.taken_1)
-    assert later.heading.taken_1 != 0.0 != later.rate.taken_1
-    fast = bridge.measure(
-        SAILING, changed, first, 99.0, INTERVAL, bridge.Settings(), None
-    )
-    assert fast.rate == pytest.approx(
-        bridge.notched(0.0, 2.8, False, first.rate)
-    )  # not beyond what is sampled

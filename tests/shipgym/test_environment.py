@@ -2,7 +2,6 @@
 
 import copy
 import pickle
-from dataclasses import replace
 from functools import partial
 
 import gymnasium
@@ -12,12 +11,9 @@ from gymnasium.wrappers import TimeAwareObservation
 
 from shipgym import InputError, load_model
 from shipgym.envs.engine import Engine, episode_keys
-from shipgym.envs.environment import given_orders
-from shipgym.tasks import course_keeping_task, path_following_task
-from shipgym.tasks.task import RUDDER_ORDERS
+from shipgym.tasks import course_keeping_task
 
 PATH, COURSE = "shipgym/PathFollowing-v0", "shipgym/CourseKeeping-v0"
-NINE = [np.array(RUDDER_ORDERS, dtype=np.float32)]
 HOOK = [[0.0, 0.0], [1500.0, 0.0], [2900.0, 1400.0]]
 SEA = {
     "model": "mariner",
@@ -236,145 +232,6 @@ def test_a_refused_action_leaves_what_was_shown():
     assert before[2].all()  # costs
     for array, now in zip(before, shown_by(engine), strict=True):
         np.testing.assert_array_equal(now, array)
-
-
-def test_the_first_reward_that_is_no_number_is_named():
-    engine = three_ships()
-    engine.step(np.zeros((3, 1)))
-    own = engine.task.definition.reward_source
-    engine.outputs.outcomes[0, 1] = (
-        np.inf
-    )  # a sum beyond all numbers, of parts that are within
-    with pytest.raises(InputError) as caught:
-        engine.refuse_rewards()
-    value = engine.info("reward_heading")[1]
-    assert str(caught.value).startswith(
-        f"{own}: reward_heading: expected a finite number, got {value} in lane 1"
-        " at step 1; look for"
-    )
-    engine.info("reward_rudder_rate")[2] = np.nan
-    with pytest.raises(
-        InputError,
-        match=r"reward_rudder_rate: expected a finite number, got nan in lane 2",
-    ):
-        engine.refuse_rewards()
-
-
-def test_a_state_tells_which_number_of_which_ship_is_none():
-    env = many().unwrapped
-    env.reset(seed=0)
-    state = env.get_state()
-    first = state["engine"]["states"].reshape(-1, 64)
-    rows = len(state["engine"]["made_for"]["rows"])
-    for row, name in ((3, "motion.u"), (rows, "plan"), (rows + 9, "plan")):
-        wrong = copy.deepcopy(state)
-        wrong["engine"]["states"].reshape(-1, 64)[row, 2] = np.inf
-        with pytest.raises(
-            InputError,
-            match=f"^state: {name}: expected finite numbers, got none in row 2$",
-        ):
-            env.set_state(wrong)
-    first[:, 3:] = np.nan  # lanes without a ship
-    env.set_state(state)
-
-
-def test_a_state_of_another_ship_by_the_same_name_is_refused():
-    mariner = load_model("mariner")
-    other = replace(mariner, coefficients={**mariner.coefficients, "N_d": 0.0011})
-    env, another = (one(COURSE, model=ship).unwrapped for ship in (mariner, other))
-    for each in (env, another):
-        each.reset(seed=0)
-    with pytest.raises(
-        InputError,
-        match=r"^state: expected that of this 'mariner', got another ship's$",
-    ):
-        env.set_state(another.get_state())
-    short = env.get_state()
-    short["engine"]["keys"] = short["engine"]["keys"][:, :2]
-    with pytest.raises(
-        InputError,
-        match=r"^state: keys: expected shape \(1, 3, 64\), got \(1, 2, 64\)$",
-    ):
-        env.set_state(short)
-
-
-def test_numbers_of_the_state_are_read_and_written_by_name():
-    engine = three_ships()
-    assert engine.read("u").tolist() == [engine.model.particulars["speed"]] * 3
-    assert not np.any(
-        [
-            engine.read(name)
-            for name in ("v", "r", "delta", "rudder_command", "steps", "ended")
-        ]
-    )
-    assert engine.read("shaft_command").tolist() == [1.0] * 3
-    engine.write("r", [1e-3, 2e-3, 3e-3])
-    assert engine.read("r").tolist() == [1e-3, 2e-3, 3e-3]
-    assert engine.read("u").tolist() == [engine.model.particulars["speed"]] * 3
-    with pytest.raises(KeyError, match="depth"):
-        engine.read("depth")
-
-
-def test_lengths_of_a_path_are_in_metres_where_there_is_one():
-    mariner = load_model("mariner")
-    course = Engine(mariner, 1, course_keeping_task())
-    path = Engine(mariner, 1, path_following_task())
-    assert path.path_metres("corridor") == pytest.approx(160.93)
-    assert path.path_metres("turn_radius") == pytest.approx(4.0 * 160.93)
-    assert course.path_metres("corridor") is None
-    assert course.waypoints() is None
-
-
-def test_masks_and_orders_of_all_ships_cannot_be_written_by_accident():
-    env = many(COURSE, model="mariner").unwrapped
-    env.reset(seed=0)
-    *_, infos = env.step(np.zeros((3, 1), np.float32))
-    with pytest.raises(ValueError, match="read-only"):
-        infos["_heading_error"][0] = False
-
-
-def test_episodes_of_a_checkpoint_go_on_for_every_row():
-    env, other = (
-        many(COURSE, model="mariner").unwrapped,
-        many(COURSE, model="mariner").unwrapped,
-    )
-    env.reset(seed=4)
-    sailed(env, 10)
-    memory = env.memory()
-    ours = sailed(env, 10, swing=0.8)
-    other.remember(memory)
-    same(ours, sailed(other, 10, swing=0.8))
-    np.testing.assert_array_equal(env.reset()[0], other.reset()[0])
-
-
-@pytest.mark.parametrize(
-    ("given", "expected"),
-    [(4, [[0.0]]), (np.int64(0), [[-1.0]]), (8, [[1.0]]), (np.uint8(5), [[0.1]])],
-)
-def test_an_order_is_one_of_nine(given, expected):
-    np.testing.assert_allclose(given_orders(NINE, given, (), "action"), expected)
-
-
-@pytest.mark.parametrize("wrong", [-1, 9, 4.0, [4], True])
-def test_what_is_no_order_is_refused(wrong):
-    with pytest.raises(InputError) as caught:
-        given_orders(NINE, wrong, (), "action")
-    assert (
-        str(caught.value)
-        == f"action: expected an integer from 0 to 8: a rudder order, got {wrong!r}"
-    )
-
-
-def test_orders_of_several_ships_are_a_column():
-    found = given_orders(NINE, [0, 8, 2], (3,), "actions")
-    np.testing.assert_allclose(found, [[-1.0], [1.0], [-0.25]])
-    assert found.dtype == np.float32
-    for wrong in ([0, 8], [0, 8, 9], [-1, 0, 0], [0.0, 1.0, 2.0], 3):
-        with pytest.raises(
-            InputError,
-            match=r"expected integers of shape \(3,\) from 0 to 8: rudder orders",
-        ):
-            given_orders(NINE, wrong, (3,), "actions")
 
 
 def test_seeds_are_those_of_gymnasiums_generators():

@@ -7,19 +7,18 @@ from itertools import pairwise
 import gymnasium
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import shipgym
 from shipgym import InputError
-from shipgym.engine.motion import Motion, Ship, ground_velocity
+from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.records import leaves
 from shipgym.envs.engine import Engine
 from shipgym.sea import Current, Waves, Weather, Wind
-from shipgym.tasks import path_following, planned_legs
-from shipgym.tasks.contract import Interval, Readings
+from shipgym.tasks import path_following
 from shipgym.tasks.guidance import Path, wrapped
-from shipgym.tasks.path_following import Settings, State, observe
+from shipgym.tasks.path_following import Settings, State
 from shipgym.tasks.planned_legs import fix, leg_from
 from shipgym.tasks.steering import RudderActivity, rudder_activity
 from shipgym.tasks.task import Task
@@ -158,45 +157,6 @@ def test_way_and_course_go_on_evenly_through_turns():
     assert states[-1][0].leg.number == 2.0
 
 
-def test_two_turns_are_seen_ahead():
-    env = sail(waypoints=HOOK)[2]
-    assert env.waypoints.tolist() == HOOK.tolist()
-    assert (env.turn_radius, env.corridor) == (
-        pytest.approx(RADIUS),
-        pytest.approx(LENGTH),
-    )
-    (seen, info), over, checked = env.reset(seed=0), False, set()
-    tangent, arc = RADIUS * np.tan(np.pi / 8.0), RADIUS * np.pi / 4.0
-    first = 1500.0 - tangent
-    second = first + arc + np.hypot(1400.0, 1400.0) - 2.0 * tangent
-    end = second + arc + 2000.0 - tangent
-    while not over:
-        seen, _, over, _, info = env.step(np.array([pd(seen)], dtype=np.float32))
-        at = dict(
-            zip(env.observation_names, seen * env.observation_scales, strict=True)
-        )
-        way = info["distance_made_good"]
-        marks, turn = (first, first + arc, second, second + arc), np.pi / 4.0
-        expected = [
-            (first - way, turn, second - way, turn),
-            (0.0, turn - (way - first) / RADIUS, second - way, turn),
-            (second - way, turn, end - way, 0.0),
-            (0.0, turn - (way - second) / RADIUS, end - way, 0.0),
-            (end - way, 0.0, end - way, 0.0),
-        ][sum(way >= mark for mark in marks)]
-        names = (
-            "next_turn_distance",
-            "next_turn_angle",
-            "second_turn_distance",
-            "second_turn_angle",
-        )
-        for name, value in zip(names, expected, strict=True):
-            most = 20.0 * LENGTH if "distance" in name else np.pi
-            assert at[name] == pytest.approx(min(value, most), abs=1e-4 * most), name
-        checked.add(sum(way >= mark for mark in marks))
-    assert checked == {0, 1, 2, 3, 4}
-
-
 def test_given_waypoints_are_sailed_in_every_episode():
     env = gymnasium.make(ID, model="mariner", waypoints=HOOK).unwrapped
     for seed in (0, 1):
@@ -269,21 +229,6 @@ def test_running_aground_ends_the_episode_and_says_so():
     assert last["reward_end"] == pytest.approx(-left * (4.0**2 + 2.0))
 
 
-def test_a_propeller_that_holds_ahead_only_is_stopped_by_an_order_astern():
-    """The thrust polynomial of KVLCC2 would push a ship ahead that reverses
-    her shaft."""
-    runs = []
-    for order in (-1.0, 0.0):
-        env = gymnasium.make(ID, model="kvlcc2", action="rudder-shaft").unwrapped
-        env.reset(seed=0)
-        for _ in range(50):
-            seen, *_ = env.step(np.array([0.0, order], dtype=np.float32))
-        runs.append(seen)
-    np.testing.assert_array_equal(*runs)
-    assert env.physical_state()["n_command"] == 0.0
-    assert env.physical_state()["u"] < 0.9 * env.model.particulars["speed"]
-
-
 def test_a_current_sets_the_ship_off_and_course_error_shows_it():
     north = [[0.0, 0.0], [9000.0, 0.0]]
     across = Weather(current=Current(1.0, towards_deg=90.0))
@@ -310,39 +255,6 @@ def test_a_current_sets_the_ship_off_and_course_error_shows_it():
 
 
 angles, speeds = st.floats(-3.1, 3.1), st.floats(-3.0, 3.0)
-
-
-@given(angles, angles, st.floats(0.5, 8.0), speeds, speeds, speeds)
-def test_course_over_ground_is_the_way_that_the_ship_moves_on_every_leg(
-    leg, psi, u, v, north, east
-):
-    """Worked with vectors north and east: way through the water, turned by the heading,
-    and the current."""
-    motion = Motion(30.0, -40.0, psi, u, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    ahead, aside = ground_velocity(motion, north, east)
-    over_ground = (u + 1j * v) * np.exp(1j * psi) + north + 1j * east
-    turned = (ahead + 1j * aside) * np.exp(1j * psi)
-    assert turned == pytest.approx(over_ground, abs=1e-9)
-    assume(abs(over_ground) > 0.01)
-    plan = np.array([0.0, 0.0, 2000.0 * np.cos(leg), 2000.0 * np.sin(leg)])
-    readings = Readings(
-        30.0, -40.0, psi, u, v, 0.0, 0.0, 0.0, 0.0, 0.0, psi, ahead, aside
-    )
-    interval = Interval(1.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    seen = observe(readings, on_path(RADIUS, plan), interval, SHIP, Settings())
-    across = np.imag((30.0 - 40.0j) * np.exp(-1j * leg))
-    assert seen.cross_track == pytest.approx(across, abs=1e-9)
-    course = leg - np.arctan2(across, 2.5 * LENGTH)
-    off = np.exp(1j * course) / over_ground
-    error = seen.course_error_cos + 1j * seen.course_error_sin
-    assert error == pytest.approx(off / abs(off), abs=1e-6)
-
-
-def test_a_ship_without_way_has_no_course_over_ground():
-    readings = Readings(0.0, 0.0, 0.3, *[0.0] * 7, 0.3, 0.0, 0.0)
-    state = on_path(RADIUS, np.array([0.0, 0.0, 900.0, 900.0]))
-    seen = observe(readings, state, Interval(1.0, 0.0, *[0.0] * 5), SHIP, Settings())
-    assert (seen.course_error_sin, seen.course_error_cos) == (0.0, 0.0)
 
 
 @settings(max_examples=20, deadline=None)
@@ -493,27 +405,6 @@ def test_gaming_the_reward_does_not_pay(policy, options, times):
 
 
 @pytest.mark.parametrize(
-    ("policy", "since"),
-    [
-        (lambda seen, step, env: [1.0], 0),
-        (lambda seen, step, env: [pd(seen) if step < 400 else -1.0], 400),
-        (lambda seen, step, env: [pd(seen) if step < 600 else 1.0], 600),
-        (lambda seen, step, env: [pd(seen) + 0.5 * np.sin(step / 8.0)], 0),
-    ],
-    ids=["circles", "circles after a while", "circles before the end", "weaves"],
-)
-def test_gaming_the_bounded_reward_does_not_pay_a_learner(policy, since):
-    asked = {"bounded": True, "waypoints": HOOK, **WIDE}
-    returns = []
-    for helmsman in (lambda seen, step, env: [pd(seen)], policy):
-        rewards, _, _ = sail(helmsman, **asked)
-        later = rewards[since:]
-        returns.append(later @ 0.99 ** np.arange(len(later)))
-    honest, played = returns
-    assert played < 0.95 * honest
-
-
-@pytest.mark.parametrize(
     "policy",
     [
         lambda seen, step, env: [0.0, 0.0],
@@ -535,27 +426,6 @@ def test_stopping_does_not_pay(policy):
     assert kept[-1]["success"]
     assert played.sum() < 2.0 * honest.sum()
     assert len(infos) > len(kept)
-
-
-def test_rudder_work_is_told_and_charged():
-    honest, infos, _ = sail(waypoints=HOOK)
-    _, chatter, env = sail(
-        lambda seen, step, env: [pd(seen) + (0.3 if step % 2 else -0.3)], waypoints=HOOK
-    )
-    for told in (infos, chatter):
-        travel = (
-            -sum(info["reward_rudder_travel"] for info in told) / 0.1 * np.radians(30.0)
-        )
-        assert told[-1]["rudder_travel"] == pytest.approx(travel)
-        reversals = -sum(info["reward_reversals"] for info in told) / 0.05
-        minutes = len(told) * env.dt / 60.0
-        assert told[-1]["reversals_per_minute"] == pytest.approx(reversals / minutes)
-    assert infos[-1]["reversals_per_minute"] < 2.0
-    assert chatter[-1]["reversals_per_minute"] > 25.0
-    assert (
-        sum(info["reward_reversals"] + info["reward_rudder_travel"] for info in chatter)
-        < 0.5 * honest.sum()
-    )
 
 
 def test_a_reversal_is_a_way_back_of_the_rudder_and_not_its_noise():
@@ -609,215 +479,3 @@ def test_a_reversal_is_a_way_back_of_the_rudder_and_not_its_noise():
 def test_a_path_that_cannot_be_planned_is_refused(options, message):
     with pytest.raises(InputError, match=message):
         gymnasium.make(ID, model="mariner", **options)
-
-
-@pytest.mark.parametrize("leg", [-1e9, 0.0, 1e9])
-def test_the_next_leg_is_one_of_the_plan_whatever_a_checkpoint_holds(leg):
-    asked, plan = Settings(), HOOK.ravel()
-    state = on_path(RADIUS, plan)
-    state = state._replace(
-        leg=state.leg._replace(number=leg), distance_made_good=5000.0
-    )
-    motion = Motion(1500.0, 100.0, *[0.0] * 9)
-    found = path_following.on_event(motion, state, None, SHIP, asked, None, plan)
-    assert found.leg.number in (1.0, 3.0)
-    assert np.isfinite(found.leg).all()
-
-
-@given(st.floats(-0.9, 0.9), st.floats(0.0, 0.099), st.sampled_from([1.0, -1.0]))
-def test_near_the_centre_of_a_turn_places_on_it_are_those_of_a_tenth_of_its_radius(
-    angle, near, side
-):
-    """Seen from the centre the arc passes below the ship as slowly as a tenth of the
-    radius off."""
-    plan, radius = np.array([0.0, 0.0, 3000.0, 0.0, 3000.0, side * 3000.0]), 1000.0
-    leg, asked = leg_from(0, 0.0, radius, plan), Settings(turn_radius=radius / LENGTH)
-    towards = np.array([1.0, -side]) / np.sqrt(
-        2.0
-    )  # from the centre to the arc's middle
-    across = np.array([1.0, side]) / np.sqrt(2.0)
-    x, y = np.array([2000.0, side * 1000.0]) + radius * (
-        near * towards + 0.1 * angle * across
-    )
-    found = fix(x, y, leg, SHIP, asked)
-    if x > 2000.0:
-        turned = np.pi / 4.0 + np.arctan(angle)
-        assert found.turned == pytest.approx(turned)
-        assert found.along_track == pytest.approx(2000.0 + radius * turned)
-        off = (
-            radius - 0.1 * radius * np.hypot(1.0, angle) + 0.1 * radius - near * radius
-        )
-        assert found.cross_track == pytest.approx(side * off)
-    else:
-        assert (found.along_track, found.turned) == (pytest.approx(x), 0.0)
-
-
-def test_a_course_leads_to_the_path_a_lookahead_distance_ahead():
-    """On the arc it is the direction of the chord to the point that far ahead on the
-    path."""
-    plan, radius, lookahead = (
-        np.array([0.0, 0.0, 3000.0, 0.0, 3000.0, 3000.0]),
-        1000.0,
-        400.0,
-    )
-    leg = leg_from(0, 0.0, radius, plan)
-    asked = Settings(turn_radius=radius / LENGTH, lookahead=lookahead / LENGTH)
-    for turned in (0.1, 0.6, 1.1):
-        x, y = 2000.0 + radius * np.sin(turned), radius * (1.0 - np.cos(turned))
-        found = fix(x, y, leg, SHIP, asked)
-        ahead = turned + lookahead / radius
-        chord = np.arctan2(
-            np.cos(turned) - np.cos(ahead), np.sin(ahead) - np.sin(turned)
-        )
-        assert found.cross_track == pytest.approx(0.0, abs=1e-9)
-        assert found.course == pytest.approx(chord)
-    aside = fix(500.0, 30.0, leg, SHIP, asked)
-    assert aside == pytest.approx((500.0, 30.0, -np.arctan(30.0 / lookahead), 0.0))
-
-
-@pytest.mark.parametrize(("legs", "least"), [(1, 0.0), (2, 4.0), (3, 8.0), (9, 8.0)])
-def test_legs_of_a_drawn_path_leave_room_for_the_turns_at_their_ends(legs, least):
-    """Right angles with a radius of 4 lengths: none for a single leg, one for two, two
-    for others."""
-    asked = Settings(
-        n_legs=legs,
-        max_turn_deg=90.0,
-        leg_lengths=path_following.Range(max(least, 0.1), 9.0),
-    )
-    path_following.check(asked, None)
-    if least:
-        tight = asked._replace(leg_lengths=path_following.Range(least - 0.01, 9.0))
-        with pytest.raises(
-            InputError,
-            match=f"the least: .* >= {least:g} .*got {least - 0.01:g}",
-        ):
-            path_following.check(tight, None)
-
-
-def test_paths_of_a_list_are_filled_up_to_the_longest_on_their_last_leg():
-    found = path_following.listed([[[0, 0], [30, 0]], [[0, 0], [0, 9], [9, 9], [9, 0]]])
-    assert found[0] == 4.0
-    first, second = found[1:].reshape(2, 4, 2)
-    np.testing.assert_allclose(first, [[0, 0], [10, 0], [20, 0], [30, 0]])
-    np.testing.assert_allclose(second, [[0, 0], [0, 9], [9, 9], [9, 0]])
-    one = path_following.listed(np.array([[0.0, 0.0], [30.0, 0.0]]))
-    assert one.tolist() == [2.0, 0.0, 0.0, 30.0, 0.0]
-    assert path_following.plan_length(Settings(waypoints=found)) == 8
-    assert path_following.plan_length(Settings(n_legs=5)) == 12
-    with pytest.raises(InputError, match="waypoints: row 1: expected another"):
-        path_following.listed([[[0, 0], [30, 0]], [[1, 1], [1, 1]]])
-
-
-def test_each_listed_path_has_to_leave_room_for_its_turns():
-    mariner = shipgym.load_model("mariner")
-    paths = path_following.listed([LINE, [[0, 0], [900, 0], [900, 500]]])
-    path_following.check(
-        Settings(waypoints=paths), None
-    )  # lengths of an unknown ship are not known
-    with pytest.raises(InputError, match=r"rows 1 and 2: .*at least 643.7.*got 500 m"):
-        path_following.check(Settings(waypoints=paths), mariner)
-    path_following.check(Settings(waypoints=paths, turn_radius=3.0), mariner)
-
-
-def test_a_corridor_is_wider_than_the_ship_whose_beam_is_known():
-    mariner = shipgym.load_model("mariner")
-    least = 0.5 * 23.17 / 160.93
-    path_following.check(Settings(corridor=1.01 * least), mariner)
-    with pytest.raises(InputError) as caught:
-        path_following.check(Settings(corridor=0.07), mariner)
-    assert str(caught.value) == (
-        "corridor: expected more than the beam of 'mariner', 23.2 m, got 22.5 m, 0.07"
-        " ship lengths to each side"
-    )
-    path_following.check(Settings(corridor=0.07), None)
-    bare = replace(mariner, particulars=replace(mariner.particulars, beam=None))
-    path_following.check(Settings(corridor=0.07), bare)
-    with pytest.raises(
-        InputError,
-        match=r"ground: expected a number > 1 .in ship lengths, beyond the c",
-    ):
-        path_following.check(Settings(ground=1.0), None)
-
-
-def test_turns_and_distances_of_a_plan():
-    plan = np.array([0.0, 0.0, 300.0, 0.0, 300.0, 400.0, 300.0, 900.0, 0.0, 900.0])
-    assert planned_legs.between(1, 2, plan) == pytest.approx((400.0, np.pi / 2))
-    assert planned_legs.between(0, 2, plan) == pytest.approx(
-        (500.0, np.arctan2(400.0, 300.0))
-    )
-    turns = [planned_legs.change_of_course(number, plan) for number in range(5)]
-    assert turns == pytest.approx([0.0, np.pi / 2, 0.0, np.pi / 2, 0.0])
-    assert [planned_legs.next_turn(number, plan) for number in range(5)] == [
-        1,
-        3,
-        3,
-        4,
-        4,
-    ]
-    assert [
-        planned_legs.part_of(turn, way, 100.0)
-        for turn, way in ((0.5, 20.0), (-0.5, 20.0))
-    ] == [
-        0.2,
-        -0.2,
-    ]
-    assert [planned_legs.part_of(-0.5, way, 100.0) for way in (-9.0, 60.0)] == [
-        0.0,
-        -0.5,
-    ]
-
-
-def test_a_step_on_the_last_leg_earns_way_up_to_its_end_only():
-    """Two ship lengths a step of service speed; the path ends at 40 lengths."""
-    asked, plan = Settings(), LINE.ravel()
-    state = on_path(RADIUS, plan)._replace(distance_made_good=39.0 * LENGTH)
-    interval = Interval(2.0 * LENGTH / SPEED, 7.0, 0.02, 0.0, 1.0, 0.0, 0.0)
-    motion = Motion(40.5 * LENGTH, 0.5 * LENGTH, *[0.0] * 7, 0.12, 0.0)
-    after, reward, aground, arrived = path_following.step(
-        motion, state, interval, SHIP, asked
-    )
-    assert after.distance_made_good == pytest.approx(40.0 * LENGTH)
-    assert reward.progress == pytest.approx(-0.5)
-    assert reward.cross_track == pytest.approx(-0.25)
-    assert (bool(aground), bool(arrived), after.success, after.in_corridor) == (
-        False,
-        True,
-        1.0,
-        1.0,
-    )
-    assert after.rudder_travel == pytest.approx(0.1)
-    assert reward.rudder_travel == pytest.approx(-0.1 * 0.1 / np.radians(30.0))
-    for aside, within, ashore in ((1.01, 0.0, 0.0), (4.01, 0.0, 1.0)):
-        off = motion._replace(y=aside * LENGTH)
-        after, reward, aground, arrived = path_following.step(
-            off, state, interval, SHIP, asked
-        )
-        assert (after.success, after.in_corridor, after.grounded) == (
-            0.0,
-            within,
-            ashore,
-        )
-        assert not arrived
-        assert bool(aground) == bool(ashore)
-    back = motion._replace(x=30.0 * LENGTH)
-    after, reward, _, arrived = path_following.step(back, state, interval, SHIP, asked)
-    assert reward.progress == -2.0  # no less, however far back
-    assert not arrived
-    assert path_following.worst_cost(asked) == pytest.approx(18.0)
-
-
-def test_reversals_are_counted_by_the_minute():
-    asked, plan = Settings(reversal_deg=2.0, reversal_weight=0.3), LINE.ravel()
-    work = RudderActivity(1.0, np.radians(5.0), 4.0)
-    state = on_path(RADIUS, plan)._replace(rudder_activity=work)
-    interval = Interval(0.5, 100.0, 0.0, 0.0, 1.0, 0.0, 0.0)
-    for back, count in ((1.9, 4.0), (2.1, 5.0)):
-        motion = Motion(*[0.0] * 9, np.radians(5.0 - back), 0.0)
-        after, reward, *_ = path_following.step(motion, state, interval, SHIP, asked)
-        assert after.rudder_activity.reversals == count
-        assert after.reversals_per_minute == pytest.approx(count * 60.0 / 50.0)
-        assert reward.reversals == pytest.approx(-0.3 * (count - 4.0))
-    first, *_ = path_following.step(
-        motion, state, interval._replace(steps=0.0), SHIP, asked
-    )
-    assert first.reversals_per_minute == pytest.approx(5.0 * 60.0 / 0.5)

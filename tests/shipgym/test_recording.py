@@ -153,18 +153,6 @@ def test_path_and_success_are_recorded_where_there_are_any(tmp_path):
     assert episode.success is False
 
 
-def test_orders_are_what_the_ship_was_told_whatever_a_wrapper_makes_of_the_action(
-    tmp_path,
-):
-    env = gymnasium.wrappers.RescaleAction(
-        course_keeping(), np.float32(-2.0), np.float32(2.0)
-    )
-    sail(RecordEpisode(env, tmp_path))
-    episode = Episode.load(tmp_path / "episode-00000.json")
-    ordered = np.clip(episode.actions[:, 0] / 2.0, -1.0, 1.0) * episode.rudder_limit
-    np.testing.assert_allclose(episode.commands["delta"], ordered, rtol=1e-6)
-
-
 @pytest.mark.parametrize("model", ["container", "kvlcc2"])
 def test_ships_with_a_shaft_have_its_speed_in_their_trials(tmp_path, model):
     sail(RecordEpisode(course_keeping(model=model), tmp_path))

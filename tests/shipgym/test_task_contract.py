@@ -1,18 +1,14 @@
 """Arrays, plan, random numbers and repeated records in a task; settings at a reset."""
 
-import re
-
 import gymnasium
 import numpy as np
 import pytest
 
-import shipgym
 from shipgym import InputError, register_task
 from shipgym.engine.records import leaves, short_names
 from shipgym.engine.specialise import is_shipped
 from shipgym.tasks.contract import Random, drawn, drawn_normal, under_way
 from shipgym.tasks.definition import read_definition
-from shipgym.tasks.task import Task
 
 COURSE = "shipgym/CourseKeeping-v0"
 TASK = """
@@ -281,26 +277,3 @@ def test_random_numbers_are_a_function_of_key_episode_and_number():
     assert np.std(normal) == pytest.approx(1.0, abs=0.05)
     assert abs(np.corrcoef(normal, uniform)[0, 1]) < 0.05
     assert under_way(1.0, 2.0, 0.5, 3.0, 1.5)[:4] == (1.0, 2.0, 0.5, 3.0)
-
-
-def test_rudder_and_shaft_are_ordered_by_numbers():
-    options = {"model": "kvlcc2", "action": "rudder-shaft-discrete"}
-    orders = Task.of("CourseKeeping", action=options["action"]).orders(
-        shipgym.load_model("kvlcc2")
-    )
-    env = gymnasium.make(COURSE, **options).unwrapped
-    many = gymnasium.make_vec(COURSE, num_envs=2, **options)
-    continuous = gymnasium.make(COURSE, model="kvlcc2", action="rudder-shaft").unwrapped
-    assert env.action_space.nvec.tolist() == [len(known) for known in orders]
-    for one in (env, many, continuous):
-        one.reset(seed=0)
-    action = np.array([7, 2])
-    command = np.array([orders[0][7], orders[1][2]], dtype=np.float32)
-    expected = continuous.step(command)[0]
-    np.testing.assert_array_equal(env.step(action)[0], expected)
-    np.testing.assert_array_equal(many.step(np.tile(action, (2, 1)))[0][0], expected)
-    for wrong in ([9, 0], [0, 9], 3, [0.5, 0.0]):
-        with pytest.raises(InputError, match="action: expected integers of shape"):
-            env.step(wrong)
-    with pytest.raises(InputError, match=re.escape("actions: expected integers")):
-        many.step(action)

@@ -2,32 +2,18 @@
 documentation page."""
 
 import re
-import sys
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Annotated, NamedTuple
 
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv
-from stable_baselines3 import PPO
 
-import shipgym
-from shipgym import InputError, ShipVecEnv, check_task, check_vector_env, register_task
+from shipgym import InputError, check_task, check_vector_env, register_task
 from shipgym.engine.source import (
-    annotated,
-    check_namespace,
-    kept_source,
-    keywords,
-    make_settings,
     read_source,
 )
-from shipgym.envs.engine import Engine
-from shipgym.python_files import load_file
-from shipgym.tasks.contract import NO_NUMBERS, Numbers, Setting
-from shipgym.tasks.definition import no_worst_cost, read_definition
 from shipgym.tasks.task import Task
 
 ROOT = Path(__file__).parents[2]
@@ -109,25 +95,11 @@ def test_the_limit_is_what_it_says(fairway):
     assert info["reward_end"] == pytest.approx(-52.0 * (600 - steps))
 
 
-def test_an_agent_is_trained_for_it(fairway):
-    agent = PPO(
-        "MlpPolicy",
-        ShipVecEnv(fairway, num_envs=4, seed=0),
-        n_steps=16,
-        batch_size=32,
-        n_epochs=1,
-    )
-    agent.learn(128)
-    assert agent.num_timesteps == 128
-
-
 def test_spawned_workers_read_the_file(tmp_path):
     path = str(written(tmp_path, "fairway.py", FAIRWAY))
 
     def make():
         import gymnasium
-
-        import shipgym  # noqa: F401 - registers
 
         return gymnasium.make(COURSE, task=path, model="kvlcc2", action="rudder-shaft")
 
@@ -515,152 +487,6 @@ def test_an_observation_that_is_no_number_before_the_first_step_is_a_problem(tmp
     )  # of what is clipped
 
 
-def test_what_fails_in_a_file_that_is_imported_is_told_with_both_places(
-    tmp_path, monkeypatch
-):
-    monkeypatch.syspath_prepend(tmp_path)
-    written(tmp_path, "harbour_tools.py", "depth = 7\n1 / 0\n")
-    path = written(tmp_path, "own.py", "import math\nimport harbour_tools\n")
-    with pytest.raises(
-        InputError,
-        match=r"own.py, line 2: .*ZeroDivisionError.* \(.*harbour_tools.py, line 2\)$",
-    ):
-        load_file(path)
-
-
-def test_what_is_interrupted_while_it_is_read_is_read_anew(tmp_path):
-    path = written(tmp_path, "own.py", "first = 1\nraise KeyboardInterrupt\n")
-    for _ in range(2):
-        with pytest.raises(KeyboardInterrupt):
-            load_file(path)
-
-
-AS_TEXT = "from __future__ import annotations\n"
-RECORD = (
-    "from typing import NamedTuple\n\n\nclass Settings(NamedTuple):\n    weight: float"
-    " = 1.0\n\n\n"
-)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (
-            "",
-            r"own.py: expected a NamedTuple 'Settings' of floats .* got no 'Settings'",
-        ),
-        (
-            "Settings = 3\n",
-            "Settings: expected a NamedTuple 'Settings' of floats, got none",
-        ),
-        (
-            RECORD.replace("float", "flaot"),
-            "own.py, line 5: cannot be executed: NameError: name 'flaot'",
-        ),
-        (
-            AS_TEXT + RECORD.replace("float", "flaot"),
-            "Settings: an annotation cannot be read: name 'flaot'",
-        ),
-        (
-            (
-                "from collections import namedtuple\nSettings = namedtuple('Settings',"
-                " '')\n"
-            ),
-            "expected one number at least, got no annotated fields",
-        ),
-        (
-            RECORD.replace(" = 1.0", ""),
-            "Settings.weight: expected a default, got none",
-        ),
-        (
-            RECORD.replace("1.0", "'1'"),
-            "Settings.weight: expected a number, or a list as the last field, got '1'",
-        ),
-        (
-            RECORD + "begin = 3\n",
-            "begin: expected a function begin\\(ship\\), got no plain function",
-        ),
-        (
-            RECORD + "def begin(ship, more): ...\n",
-            "begin: expected a function begin.* got one of 2 arguments",
-        ),
-        (RECORD + "def begin(ship): ...\n", None),
-        (RECORD, "expected a function begin.* got no 'begin'"),
-        ("1 / 0", r"own.py, line 1: cannot be executed: ZeroDivisionError"),
-    ],
-)
-def test_a_file_lacks_nothing_that_is_asked_of_it(text, message, tmp_path):
-    path = written(tmp_path, "own.py", text)
-    functions = {"begin": ("ship",)} if "1.0" in text else {}
-
-    def check():
-        check_namespace(*read_source(path), ("Settings",), functions)
-
-    if message is None:
-        check()
-        assert read_source(path)[0] is read_source(str(path))[0]  # executed once
-    else:
-        with pytest.raises(InputError, match=message):
-            check()
-
-
-@pytest.mark.parametrize(("before", "annotation"), [("", float), (AS_TEXT, "float")])
-def test_annotations_are_texts_only_where_a_file_asks_for_it(
-    tmp_path, before, annotation
-):
-    file, _ = read_source(
-        written(tmp_path, "own.py", f"{before}def scale(x: float): ...\n")
-    )
-    assert file.scale.__annotations__ == {"x": annotation}
-
-
-def test_a_reward_of_another_form_is_told_as_what_its_function_returns(tmp_path):
-    path = written(
-        tmp_path,
-        "my_reward.py",
-        re.sub(r"return Reward\((.*)\)\n$", r"return [\1]\n", REWARD, flags=re.DOTALL),
-    )
-    with pytest.raises(
-        InputError,
-        match=r"my_reward.py, line \d+, in reward: returned value: expected .* list",
-    ):
-        register_task("harbour/Wrong-v0", "CourseKeeping", reward=path)
-
-
-def test_annotations_of_a_reward_may_be_texts(tmp_path):
-    head, end, rest = REWARD.partition('"""\n\n')
-    paths = (
-        written(tmp_path, name, f"{head}{end}{before}{rest}")
-        for name, before in (("own.py", ""), ("texts.py", AS_TEXT))
-    )
-    own, texts = (read_definition("CourseKeeping", path) for path in paths)
-    assert own.reward_names == texts.reward_names == ("heading", "rudder")
-
-
-@pytest.mark.parametrize("before", ["", AS_TEXT])
-def test_a_task_is_sound_however_its_annotations_are_read(tmp_path, before):
-    text = FAIRWAY.replace(AS_TEXT, "")
-    head, end, rest = text.partition('"""\n\n')
-    path = written(tmp_path, "fairway.py", f"{head}{end}{before}{rest}")
-    assert str(check_task(path, **SHIP)) == "fairway: sound"
-
-
-def test_a_record_with_a_note_of_its_own_is_a_record_all_the_same():
-    class Inner(NamedTuple):
-        weight: Annotated[float, Setting("The weight.", above=0.0)] = 2.0
-
-    class Outer(NamedTuple):
-        inner: Annotated[Inner, "what a user notes"] = Inner()
-        plain: Annotated[float, "likewise"] = 3.0
-
-    assert [(name, kind) for name, kind, _ in annotated(Outer, Setting)] == [
-        ("inner", Inner),
-        ("plain", float),
-    ]
-    assert [name for name, *_ in keywords(Outer)] == ["weight", "plain"]
-    assert make_settings(Outer, {"weight": 5.0}, np.asarray) == Outer(Inner(5.0), 3.0)
-
-
 def test_a_file_that_is_not_there_is_named(tmp_path):
     with pytest.raises(
         InputError, match=r"none.py: expected a Python file, got no such file"
@@ -767,182 +593,6 @@ def test_ids_are_taken_once(fairway, tmp_path):
         register_task(fairway, tmp_path / "fairway.py", **SHIP)
 
 
-def test_lanes_of_a_task_are_equal_bit_for_bit(tmp_path):
-    task = Task.of(
-        written(tmp_path, "fairway.py", FAIRWAY), action="rudder-shaft", sea="rough"
-    )
-    ship = shipgym.load_model("kvlcc2")
-    small, large = Engine(ship, 3, task), Engine(ship, 130, task, threads=2)
-    np.testing.assert_array_equal(
-        small.reset([127, 128, 129]), large.reset(np.arange(130))[127:]
-    )
-    for k in range(40):
-        order = [0.3 * np.sin(k), 0.7]
-        seen, rewards, *_ = small.step(np.tile(order, (3, 1)))
-        many, earned, *_ = large.step(np.tile(order, (130, 1)))
-        np.testing.assert_array_equal(seen, many[127:])
-        np.testing.assert_array_equal(rewards, earned[127:])
-
-
-def test_an_error_of_a_file_is_told_with_its_last_line_in_it_and_the_file_may_be_mended(
-    tmp_path,
-):
-    def refused(text):
-        with pytest.raises(InputError) as caught:
-            load_file(written(tmp_path, "own.py", text))
-        return str(caught.value).removeprefix(str(tmp_path / "own.py"))
-
-    calls = "import json\n\n\ndef read():\n    json.loads('{')\n\n\nread()\n"
-    for _ in range(2):  # what failed is not taken for read
-        assert refused(calls).startswith(
-            ", line 5: cannot be executed: JSONDecodeError: "
-        )
-    assert refused("x = (\n").startswith(", line 1: cannot be executed: SyntaxError: ")
-    assert (
-        refused("from shipgym import InputError\nraise InputError('no such tide')\n")
-        == ", line 2: no such tide"
-    )
-    assert refused("\0").startswith(": cannot be executed: ")
-    own = load_file(written(tmp_path, "own.py", "x = 3\n"))
-    assert (own.x, own.__file__) == (3, str((tmp_path / "own.py").resolve()))
-    assert load_file(tmp_path / "own.py") is own is sys.modules[own.__name__]
-    assert load_file(written(tmp_path, "other.py", "x = 3\n")) is not own
-
-
-def test_a_task_that_is_none_is_told_by_its_name():
-    found = check_task("CourseKeping")
-    assert found.name == "CourseKeping"
-    assert found.problems[0].startswith(
-        "task: expected the path of a .py file or one of"
-    )
-    assert found.problems[0].endswith(" Did you mean 'CourseKeeping'?")
-    assert not found.ok
-
-
-def test_options_of_a_task_are_kept_as_given_in_absolute_paths(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert (
-        kept_source("own.py") == kept_source(Path("own.py")) == str(tmp_path / "own.py")
-    )
-    assert [kept_source(one) for one in ("PathFollowing", None, shipgym)] == [
-        "PathFollowing",
-        None,
-        shipgym,
-    ]
-
-
-class Least(NamedTuple):
-    least: float
-    largest: float
-
-
-class Choices(NamedTuple):
-    count: Annotated[int, Setting("A count.", at_least=1, at_most=100, whole=True)] = 4
-    share: Annotated[float, Setting("A share.", above=0.0, at_most=1.0)] = 0.5
-    lengths: Annotated[Least, Setting("Lengths.", above=0.0)] = Least(1.0, 2.0)
-    free: float = 0.0
-    listed: Annotated[Numbers, Setting("Numbers.", at_least=-1.0)] = NO_NUMBERS
-
-
-def test_settings_are_given_by_keyword_the_others_are_their_defaults():
-    assert make_settings(Choices, {}, np.asarray) == Choices()
-    found = make_settings(
-        Choices, {"count": 100, "lengths": [3, 4.5], "listed": [1, -1.0]}, np.asarray
-    )
-    assert found[:4] == (100, 0.5, Least(3.0, 4.5), 0.0)
-    assert found.listed.tolist() == [1.0, -1.0]
-    assert make_settings(Choices, {"listed": None}, np.asarray).listed.tolist() == []
-    assert make_settings(Choices, {"free": -1e9, "share": 1.0}, np.asarray)[1:4:2] == (
-        1.0,
-        -1e9,
-    )
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"count": 0}, "count: expected an integer of at least 1, got 0"),
-        ({"count": 2.0}, "count: expected an integer of at least 1, got 2.0"),
-        ({"count": 101}, "count: expected a number >= 1 and <= 100, got 101"),
-        ({"share": 0.0}, "share: expected a number > 0 and <= 1, got 0"),
-        (
-            {"lengths": (3.0, 0.0)},
-            "lengths: the largest: expected a number > 0, got 0",
-        ),
-        ({"lengths": (0.0, 3.0)}, "lengths: the least: expected a number > 0, got 0"),
-        (
-            {"lengths": (1.0,)},
-            r"lengths: expected the least and the largest, got \(1.0,\)",
-        ),
-        ({"lengths": "12"}, "lengths: expected the least and the largest, got '12'"),
-        (
-            {"listed": [0.0, -1.5]},
-            "listed: number 1: expected a number >= -1, got -1.5",
-        ),
-        ({"listed": 3.0}, "listed: expected a list, got 3.0"),
-        ({"listed": [[1.0]]}, r"listed: expected a list, got \[\[1.0\]\]"),
-        ({"listed": []}, "listed: expected one number at least, or None, got none"),
-    ],
-)
-def test_settings_beyond_their_bounds_are_refused(options, message):
-    with pytest.raises(InputError, match=f"^{message}$"):
-        make_settings(Choices, options, np.asarray)
-
-
-class Inner(NamedTuple):
-    listed: Numbers
-    weight: float
-
-
-class ListBefore(NamedTuple):
-    listed: Numbers = NO_NUMBERS
-    weight: float = 1.0
-
-
-class WithInner(NamedTuple):
-    inner: Inner
-
-
-def test_a_list_stands_last_and_in_settings_alone():
-    with pytest.raises(
-        InputError,
-        match=r"^own: Settings.listed: expected a number, or a list as the last",
-    ):
-        check_namespace(SimpleNamespace(Settings=ListBefore), "own", ("Settings",), {})
-    with pytest.raises(
-        InputError, match=r"^own: State.inner.listed: expected an array of a"
-    ):
-        check_namespace(SimpleNamespace(State=WithInner), "own", ("State",), {})
-    assert check_namespace(
-        SimpleNamespace(Settings=Choices), "own", ("Settings",), {}
-    ) == {"Settings": Choices}
-    assert check_namespace(SimpleNamespace(), "own", (), {"due": ()}, ("due",)) == {}
-
-
-def test_a_task_without_events_and_plan_is_complete():
-    task = read_definition(ROOT / "examples" / "fairway.py")
-    settings = task.Settings()
-    moment = (None, "state", None, None, settings)
-    assert task.due(*moment) is False
-    assert task.on_event(*moment, None, None) == "state"
-    assert task.plan_length(settings) == 0
-    assert task.check(settings, None) is None
-    assert no_worst_cost(settings) == 0.0
-    assert (task.name, task.episode_steps, task.flags) == (
-        "fairway",
-        600,
-        ("speeding",),
-    )
-    assert task.reported == ("speeding", "cross_track")
-    assert task.reward_names == ("cross_track", "delay", "over_speed")
-    assert not task.shipped
-    assert task.reward_source == task.source == str(ROOT / "examples" / "fairway.py")
-    own = read_definition("CourseKeeping")
-    assert own.shipped
-    assert own.reward_source.endswith("course_keeping.py")
-    assert read_definition(own) is own
-
-
 def test_bounds_of_an_observation_are_finite_and_in_order(tmp_path):
     for bounds, wrong in {
         "1.0, 1.0": "upper bound: expected a number > 1, got 1",
@@ -970,41 +620,3 @@ def test_bounds_of_an_observation_are_finite_and_in_order(tmp_path):
         (problem,) = check_task(path).problems
         assert problem.startswith(str(path)), problem
         assert wrong in problem, problem
-
-
-def test_names_that_the_engine_has_in_info_are_not_reported(tmp_path):
-    text = FAIRWAY.replace("speeding: Flag", "truncated: Flag").replace(
-        '"speeding", ', '"truncated", '
-    )
-    with pytest.raises(
-        InputError,
-        match=(
-            r"REPORTED: expected a tuple of fields of State, none of .* got 'truncated'"
-        ),
-    ):
-        read_definition(written(tmp_path, "fairway.py", text))
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        (
-            "    delay: float",
-            "    end: float",
-            "got two fields 'end'; the engine has one of that name$",
-        ),
-        (
-            "    to_zone: Annotated",
-            "    limit_: Inner\n    to_zone: Annotated",
-            "expected names that differ, got two fields 'limit'$",
-        ),
-    ],
-)
-def test_two_fields_of_one_name_are_refused(tmp_path, old, new, message):
-    inner = (
-        "class Inner(NamedTuple):\n    limit: Annotated[float, ObservationSpec(0.0,"
-        " 1.0)]\n\n\nclass Observation("
-    )
-    text = FAIRWAY.replace("class Observation(", inner).replace(old, new, 1)
-    with pytest.raises(InputError, match=message):
-        read_definition(written(tmp_path, "fairway.py", text))

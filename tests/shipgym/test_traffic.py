@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from stable_baselines3 import PPO
 
-import shipgym
 from shipgym import InputError, ShipVecEnv, check_task, load_model
 from shipgym.engine.motion import Motion
 from shipgym.tasks import traffic
@@ -89,14 +88,6 @@ def test_the_cases_of_imazu_are_collisions():
     assert collided.all()
 
 
-def test_an_encounter_differs_from_episode_to_episode_of_a_case():
-    task = ROOT / "examples" / "encounter.py"
-    for scatter, n_different in ((0.0, 1), (1.0, 8)):
-        ships = gymnasium.make_vec(COURSE, 8, task=task, dt=5.0, scatter=scatter)
-        seen, _ = ships.reset(seed=0, options={"case": np.full(8, 12)})
-        assert len(np.unique(seen, axis=0)) == n_different
-
-
 def test_the_example_is_a_task_of_one_screen_that_is_learned(tmp_path):
     assert ENCOUNTER.count("\n") < 120
     path = ROOT / "examples" / "encounter.py"
@@ -163,12 +154,3 @@ def test_a_task_draws_what_it_wants_shown(tmp_path):
 def test_shapes_that_cannot_be_drawn_are_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()
-
-
-def test_ships_with_a_sum_over_data_are_no_targets():
-    staged = [
-        name for name in shipgym.list_models() if load_model(name).compiled.staged
-    ]
-    for name in staged[:1]:
-        with pytest.raises(InputError, match="vessel: expected a ship with equations"):
-            traffic.vessel(name)

@@ -407,38 +407,3 @@ def test_each_promise_that_is_broken_is_named(kind, changes, message):
         pytest.raises(InputError, match=f"(?s)^vector environment: .*{message}"),
     ):
         check_vector_env(broken, n_steps=30)
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        changed_step(rewards=lambda one: 2.0 * one),
-        changed_step(seen=lambda one: one * np.array([[1.0], [0.5]], np.float32)),
-    ],
-)
-def test_a_row_that_is_not_the_single_environment_is_named(changes):
-    with pytest.raises(
-        InputError,
-        match=r"row [01]: expected .* of the single environment with seed .*, got",
-    ):
-        check_vector_env(type("Broken", (Walkers,), changes), Walker, 60)
-
-
-def test_rows_of_different_ends_are_compared_until_all_steps_are_taken():
-    """The second row's reward is wrong in its second episode only."""
-
-    class Late(WalkersInTurn):
-        def reset(self, **options):
-            self.ends = 0
-            return super().reset(**options)
-
-        def step(self, actions):
-            seen, rewards, terminated, *rest = super().step(actions)
-            wrong = np.array([0.0, self.ends > 0])
-            self.ends += terminated[1]
-            return seen, rewards - wrong, terminated, *rest
-
-    with pytest.raises(
-        InputError, match=r"row 1: expected .* of the single environment with seed 1235"
-    ):
-        check_vector_env(Late, Walker, 30)

@@ -187,24 +187,6 @@ def test_ships_differ_from_episode_to_episode_and_return_with_the_seed():
     assert not np.array_equal(env.physical_state()["u"], speeds)
 
 
-def test_a_task_is_the_same_whatever_ship_is_drawn():
-    plain, drawn = vector(PATH, 5), vector(PATH, 5, speed_range=(0.5, 1.0))
-    for env in (plain, drawn):
-        env.reset(seed=1)
-    np.testing.assert_array_equal(
-        plain.physical_state()["psi"], drawn.physical_state()["psi"]
-    )
-    np.testing.assert_array_equal(
-        plain.unwrapped.waypoints(4), drawn.unwrapped.waypoints(4)
-    )
-    np.testing.assert_array_equal(
-        plain.unwrapped.waypoints(), plain.unwrapped.waypoints(0)
-    )
-    assert not np.array_equal(
-        plain.unwrapped.waypoints(0), plain.unwrapped.waypoints(1)
-    )
-
-
 def test_workers_of_other_processes():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -221,75 +203,12 @@ def test_workers_of_other_processes():
     env.close()
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (
-            {"reset_mask": np.zeros(3, dtype=np.bool_)},
-            "reset_mask: expected True in one row at least",
-        ),
-        ({"reset_mask": np.ones(2, dtype=np.bool_)}, "expected a bool array of 3"),
-        ({"reset_mask": np.ones(3, dtype=np.int64)}, "expected a bool array of 3"),
-        ({"reset_mask": [True] * 3}, "expected a bool array of 3"),
-        ({"mask": np.ones(3, dtype=np.bool_)}, "Did you mean 'reset_mask'"),
-    ],
-)
-def test_a_mask_that_says_nothing_is_refused(options, message):
-    envs = gymnasium.make_vec("shipgym/CourseKeeping-v0", num_envs=3, model="mariner")
-    envs.reset(seed=0)
-    with pytest.raises(InputError, match=message):
-        envs.reset(options=options)
-
-
 def test_an_unknown_mode_is_refused():
     for name, value in (("autoreset_mode", "Never"), ("render_mode", "human")):
         with pytest.raises(InputError, match=f"{name}: .*expected"):
             gymnasium.make_vec(
                 "shipgym/CourseKeeping-v0", num_envs=2, model="mariner", **{name: value}
             )
-
-
-@pytest.mark.parametrize("given", ["SameStep", "SAME_STEP", AutoresetMode.SAME_STEP])
-def test_a_mode_is_named_as_gymnasium_has_it(given):
-    assert (
-        vector(COURSE, 2, autoreset_mode=given).metadata["autoreset_mode"]
-        is AutoresetMode.SAME_STEP
-    )
-
-
-def test_without_a_mode_the_next_step_begins_the_next_episode():
-    env = vector(COURSE, 2, episode_steps=3)
-    assert (
-        env.metadata["autoreset_mode"]
-        is env.unwrapped.autoreset_mode
-        is AutoresetMode.NEXT_STEP
-    )
-    assert env.metadata["render_modes"] == ["rgb_array"]
-    env.reset(seed=0)
-    steps = [env.step(np.zeros((2, 1), np.float32)) for _ in range(5)]
-    assert [truncated.tolist() for *_, truncated, _ in steps] == [
-        [k == 2] * 2 for k in range(5)
-    ]
-    assert [rewards.tolist() == [0.0, 0.0] for _, rewards, *_ in steps] == [
-        k == 3 for k in range(5)
-    ]
-
-
-def test_rows_may_have_seeds_of_their_own_or_go_on_without():
-    env = vector(COURSE, 3)
-    first, _ = env.reset(seed=5)
-    np.testing.assert_array_equal(env.reset(seed=[5, 6, 7])[0], first)
-    np.testing.assert_array_equal(env.reset(seed=np.int64(5))[0], first)
-    second, _ = env.reset()
-    assert not np.any(np.all(second == first, axis=1))
-    mixed, _ = env.reset(seed=[None, 6, None])
-    np.testing.assert_array_equal(mixed[1], first[1])
-    env.reset(seed=5)
-    np.testing.assert_array_equal(env.reset()[0], second)
-    again, _ = env.reset(
-        options={"reset_mask": np.array([False, True, False])}, seed=[1, 6, 1]
-    )
-    np.testing.assert_array_equal(again, [second[0], first[1], second[2]])
 
 
 def test_rows_outside_of_a_mask_keep_all_that_they_show():
@@ -310,53 +229,3 @@ def test_rows_outside_of_a_mask_keep_all_that_they_show():
         match="options with a reset_mask of some rows: unknown key 'course_chan",
     ):
         env.reset(options={"reset_mask": mask, "course_change_deg": 5.0})
-
-
-def test_the_last_infos_of_rows_that_go_on_are_zeros():
-    env = vector(COURSE, 3, autoreset_mode="SameStep", episode_steps=9)
-    env.reset(seed=5)
-    for step in range(12):
-        if step == 3:
-            env.reset(options={"reset_mask": np.array([False, True, False])})
-        seen, *_, infos = env.step(np.full((3, 1), 0.5, np.float32))
-        if "final_info" in infos:
-            ended = [step != 11, step == 11, step != 11]
-            assert (
-                infos["_final_obs"].tolist() == infos["_final_info"].tolist() == ended
-            )
-            final = infos["final_info"]
-            assert (final["heading_error"] != 0.0).tolist() == ended
-            assert final["_heading_error"].tolist() == ended
-            assert final["extrapolating"].dtype == np.bool_
-            assert [one is not None for one in infos["final_obs"]] == ended
-            row = ended.index(True)
-            assert not np.array_equal(infos["final_obs"][row], seen[row])
-        else:
-            assert step not in (8, 11)
-
-
-def test_rows_answer_as_the_environments_of_gymnasium_s_sync_vector_env():
-    ours = gymnasium.make_vec("shipgym/PathFollowing-v0", num_envs=2)
-    theirs = gymnasium.make_vec(
-        "shipgym/PathFollowing-v0", num_envs=2, vectorization_mode="sync"
-    )
-    for envs in (ours, theirs):
-        envs.reset(seed=3)
-    native, sync = ours.unwrapped, theirs.unwrapped
-    assert native.get_attr("observation_names") == sync.get_attr("observation_names")
-    for mine, other in zip(
-        native.call("physical_state"), sync.call("physical_state"), strict=True
-    ):
-        assert mine == pytest.approx(other)
-    native.set_attr("skill", [1, 2])
-    assert native.get_attr("skill") == (1, 2)
-    native.set_attr("skill", 3)
-    assert native.call("skill") == (3, 3)
-    for name, values, said in (
-        ("model", 1, "set_attr: expected a name of your own, got 'model'"),
-        ("skill", [1], "set_attr: expected a value for each of 2 rows, got 1"),
-    ):
-        with pytest.raises(InputError, match=said):
-            native.set_attr(name, values)
-    with pytest.raises(AttributeError, match="a row has no attribute 'nothing'"):
-        native.call("nothing")
