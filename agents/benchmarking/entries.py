@@ -331,16 +331,12 @@ def source_files(text: str, task: BenchmarkTask) -> list[Path]:
     """Files from which a text's controllers are made for a task, in order."""
     if names_code(text):
         return _module_files(text)
-    name = task.design_name or task.name
     if text in LEARNED:
-        folder = glob.escape(str(PRETRAINED))
-        for trained_for in (name, task.environment):
-            files = _matching_files(f"{folder}/{glob.escape(trained_for)}-{text}*.json")
-            if files:
-                return files
+        agent = PRETRAINED / f"{task.environment}-{text}.json"
+        return [agent] if agent.is_file() else []
     if text in known_names():
         return []
-    return _matching_files(text.replace("{task}", name))
+    return _matching_files(text.replace("{task}", task.design_name or task.name))
 
 
 def _module_files(text: str) -> list[Path]:
