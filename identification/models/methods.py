@@ -8,34 +8,44 @@ from typing import Any
 import numpy as np
 from sklearn.base import clone
 
-import identification
 from identification.estimators.adapted import Adapted
 from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.linear import LinearRegressor
-from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
+from identification.estimators.lssvm import (
+    LSSVM,
+    LeastSquares,
+    RidgeRegression,
+    TruncatedLSSVM,
+)
+from identification.estimators.recursive import (
+    MultiInnovationLeastSquares,
+    RecursiveLeastSquares,
+    StochasticGradient,
+)
+from identification.estimators.rm_svm import RMSVM
+from identification.estimators.tuned import TunedLSSVM
 from identification.models.refinement import Refinement
 from identification.samples.samples import Samples
 from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, quoted
 
-#: By name the class of an estimator, or of a refinement, that `identification` exports,
-#: and its settings.
-METHODS: dict[str, tuple[str, dict[str, Any]]] = {
-    "ls": ("LeastSquares", {}),
-    "ridge": ("RidgeRegression", {}),
-    "ls-svm": ("LSSVM", {}),
-    "tls-svm": ("TruncatedLSSVM", {}),
-    "cv-lssvr": ("TunedLSSVM", {"optimiser": "grid"}),
-    "pso-lssvr": ("TunedLSSVM", {"optimiser": "pso"}),
-    "abc-lssvr": ("TunedLSSVM", {"optimiser": "abc"}),
-    "rls": ("RecursiveLeastSquares", {}),
-    "sg": ("StochasticGradient", {}),
-    "nisg": ("StochasticGradient", {"omega": 0.5}),
-    "mils": ("MultiInnovationLeastSquares", {"inverse_free": False}),
-    "tmils": ("MultiInnovationLeastSquares", {}),
-    "output-error": ("Refinement", {}),
-    "rm-svm": ("RMSVM", {}),
+#: By name the class of an estimator, or of a refinement, and its settings.
+METHODS: dict[str, tuple[Any, dict[str, Any]]] = {
+    "ls": (LeastSquares, {}),
+    "ridge": (RidgeRegression, {}),
+    "ls-svm": (LSSVM, {}),
+    "tls-svm": (TruncatedLSSVM, {}),
+    "cv-lssvr": (TunedLSSVM, {"optimiser": "grid"}),
+    "pso-lssvr": (TunedLSSVM, {"optimiser": "pso"}),
+    "abc-lssvr": (TunedLSSVM, {"optimiser": "abc"}),
+    "rls": (RecursiveLeastSquares, {}),
+    "sg": (StochasticGradient, {}),
+    "nisg": (StochasticGradient, {"omega": 0.5}),
+    "mils": (MultiInnovationLeastSquares, {"inverse_free": False}),
+    "tmils": (MultiInnovationLeastSquares, {}),
+    "output-error": (Refinement, {}),
+    "rm-svm": (RMSVM, {}),
 }
 
 
@@ -154,9 +164,8 @@ def without_constant(estimator: Any) -> Estimator:
 def method_options(name: str) -> tuple[str, ...]:
     """Names of the settings that a method of `METHODS` has."""
     kind, _ = METHODS[name]
-    estimator = getattr(identification, kind)
-    own: tuple[str, ...] = estimator.options
-    if kind == "Refinement":
+    own: tuple[str, ...] = kind.options
+    if kind is Refinement:
         return (*own, *TruncatedLSSVM.options)
     return own
 
@@ -177,9 +186,8 @@ def make_method(name: str, settings: Mapping[str, Any] | None = None) -> Any:
                 " for"
             )
     kind, usual = METHODS[name]
-    if kind != "Refinement":
-        estimator = getattr(identification, kind)
-        return estimator(**{**usual, **settings})
+    if kind is not Refinement:
+        return kind(**{**usual, **settings})
 
     own = {}
     of_start = {}
