@@ -11,10 +11,7 @@ import pytest
 
 from identification import Comparison, compare_methods, cross_validate
 from identification.pipeline.comparison import COMPARISON_FILES
-from identification.samples.folds import held_out_rows
-from identification.samples.samples import build_samples
 from shipgym import InputError, ShipModel, Trial
-from shipgym.ships.structures import get_structure
 
 
 @pytest.fixture(scope="module")
@@ -111,29 +108,3 @@ def test_what_cannot_be_compared_is_named(
         compare_methods(noisy_trials[:1], ["ls"], **options)
     with pytest.raises(InputError, match="expected structure 'grey-box'"):
         compare_methods(noisy_trials, ["rm-svm"], **options)
-
-
-def test_a_single_trial_is_held_out_in_pieces_that_cover_it(
-    noisy_trials: list[Trial], mariner: ShipModel
-) -> None:
-    trial, samples = (
-        noisy_trials[0],
-        build_samples(noisy_trials[:1], get_structure("abkowitz"), mariner.particulars),
-    )
-    held = list(held_out_rows([trial], samples, "trials"))
-    np.testing.assert_array_equal(
-        np.concatenate([piece.t for _, piece in held]), trial.t
-    )
-    assert [piece.name for _, piece in held] == [
-        f"{trial.name}, part {n}" for n in (1, 2, 3)
-    ]
-    both = build_samples(
-        noisy_trials[:2], get_structure("abkowitz"), mariner.particulars
-    )
-    for k, (rows, other) in enumerate(held_out_rows(noisy_trials[:2], both, "trials")):
-        assert other is noisy_trials[k]
-        assert set(both.trial[rows]) == {1 - k}
-    for rows, piece in held:
-        begins, ends = samples.start[rows], (samples.start + samples.duration)[rows]
-        assert not np.any((begins < piece.t[-1]) & (ends > piece.t[0]))
-        assert 0.6 < rows.mean() < 0.7

@@ -1,18 +1,13 @@
 """A hard turn that no trial shows: its error in the covariance, and what is taken."""
 
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from identification.judging.extrapolation import (
     beyond_trials,
-    extrapolation_error,
-    growing_error,
     holds_turn,
-    largest_rudders,
 )
-from identification.judging.selection import RankedFit, shown_to_turn
 from identification.judging.sentences import turn_sentences
 from shipgym import ShipModel, Trial, load_model
 from shipgym.manoeuvres import turning_circle, zigzag
@@ -37,43 +32,6 @@ def test_a_turn_is_told_from_zigzags(ship: ShipModel, zigzags: list[Trial]) -> N
     assert holds_turn([*zigzags, turning_circle(ship, -20.0, 1500.0, 2.0)])
 
 
-def test_the_largest_rudder_is_left_out_where_two_trials_remain(
-    ship: ShipModel, zigzags: list[Trial]
-) -> None:
-    assert largest_rudders(zigzags).tolist() == [2]
-    assert not largest_rudders(zigzags[1:]).size
-    exact = extrapolation_error(lambda places: ship, zigzags)
-    assert exact == pytest.approx(0.0, abs=0.005)
-    other = load_model("kvlcc2-nomoto")
-    assert extrapolation_error(lambda places: other, zigzags) > 0.05
-
-
-def test_what_grows_is_beyond_a_drift_and_what_is_missed_anyway(
-    ship: ShipModel, zigzags: list[Trial]
-) -> None:
-    other = load_model("kvlcc2-nomoto")
-    error = growing_error(ship, lambda places: other, zigzags)
-    assert error is not None
-    assert error > 0.05
-    assert growing_error(other, lambda places: other, zigzags) == 0.0
-
-    drift = [trial["psi"] + 1e-3 * trial.t for trial in zigzags]
-    drifting = [
-        trial.with_channels({"psi": psi})
-        for trial, psi in zip(zigzags, drift, strict=True)
-    ]
-    again = growing_error(ship, lambda places: other, drifting)
-    assert again == pytest.approx(error, rel=0.05)
-
-
-def test_a_table_is_widened_in_one_direction(zigzags: list[Trial]) -> None:
-    model = load_model("kvlcc2-nomoto")
-    narrow = replace(model, covariance=0.01 * np.asarray(model.covariance))
-    wider, _ = beyond_trials(narrow, lambda places: model, zigzags)
-    more = np.linalg.eigvalsh(wider.covariance - narrow.covariance)
-    assert (more > 1e-6 * more.max()).sum() == 1
-
-
 def test_draws_turn_by_the_error_that_the_trials_show(zigzags: list[Trial]) -> None:
     model = load_model("kvlcc2-mmg")
     other = load_model("kvlcc2-nomoto")
@@ -91,17 +49,6 @@ def test_draws_turn_by_the_error_that_the_trials_show(zigzags: list[Trial]) -> N
     assert scatter(wider) > 0.6 * told["hard_turn"]["size"]
     turned = [*zigzags, turning_circle(model, 35.0, 2000.0, 5.0)]
     assert beyond_trials(model, lambda places: other, turned) == (model, {})
-
-
-def test_few_parameters_and_priors_are_known_to_turn() -> None:
-    def fit(structure: str, ran_away: int = 0) -> RankedFit:
-        return RankedFit(structure, "ls", 3, True, ran_away, 0.1, None, None, {})
-
-    table, few, mmg = fit("cubic"), fit("norrbin"), fit("mmg")
-    ranked = [table, few, mmg, fit("grey-box", ran_away=1)]
-    assert shown_to_turn(ranked) == [few, mmg]
-    assert shown_to_turn([table]) == [table]
-    assert shown_to_turn(ranked, ["cubic"]) == [table, few, mmg]
 
 
 def test_the_page_says_what_holds_the_turn_and_by_how_much() -> None:

@@ -11,8 +11,6 @@ from sklearn.utils.estimator_checks import check_estimator
 
 import shipgym
 from identification import RMSVM, IdentificationResult, identify
-from identification.estimators.pattern_search import pattern_search
-from identification.estimators.rm_svm import heading_error, most_regularised
 from identification.models.grey_box import chosen_box
 from identification.models.similarity import (
     check_alike,
@@ -141,14 +139,6 @@ def test_too_little_known_to_choose() -> None:
         select_reference(Particulars(length=7.0, speed=1.0))
 
 
-def test_pattern_search_finds_the_corner_and_the_inside() -> None:
-    found = pattern_search(
-        lambda x: float((x[0] - 0.3) ** 2 + x[1]), (0.1, 0.5), (0, 0), (1, 1)
-    )
-    assert found.x == pytest.approx([0.3, 0.0], abs=1 / 64)
-    assert list(found.history) == sorted(found.history, reverse=True)
-
-
 def test_the_correction_passes_the_battery_of_scikit_learn() -> None:
     for estimator in (RMSVM(C=10.0), RMSVM(C=10.0, epsilon=0.0)):
         checks = check_estimator(estimator, on_skip=None, on_fail=None)
@@ -164,12 +154,6 @@ def test_a_weak_regularisation_finds_a_linear_law() -> None:
     assert estimator.coef_ == pytest.approx([2.0, -500.0, 0.3], rel=1e-3)
     free = RMSVM(C=1e6, epsilon=0.0).fit(X[:, :2], X[:, :2] @ [2.0, -500.0])
     assert free.coef_ == pytest.approx([2.0, -500.0], rel=1e-3)
-
-
-def test_a_feature_that_is_zero_throughout_gets_no_correction() -> None:
-    X = np.column_stack([np.random.default_rng(0).standard_normal(200), np.zeros(200)])
-    estimator = RMSVM(C=1e6, epsilon=0.0).fit(X, 2.0 * X[:, 0])
-    assert estimator.coef_ == pytest.approx([2.0, 0.0], rel=1e-3)
 
 
 @pytest.mark.parametrize(("weight", "band"), [(0.1, 0.1), (1.0, 0.5), (30.0, 0.0)])
@@ -235,30 +219,6 @@ def test_the_weight_may_be_judged_by_the_largest_rudder(
 
     assert least > 0.0
     assert error(least) < min(error(0.0), error(0.1 * least))
-
-
-def test_rudders_within_a_tenth_of_the_largest_are_the_largest() -> None:
-    rudders = np.radians([10.0, -8.9, -9.1, 5.0])
-    runs = [
-        Trial(np.arange(3.0), {"delta": np.array([0.0, rudder, 0.05])})
-        for rudder in rudders
-    ]
-    assert of_largest_rudder(runs, "folds").tolist() == [True, False, True, False]
-
-
-@pytest.mark.parametrize(
-    ("errors", "chosen"),
-    [
-        ((1.11, 1.09, 1.0), "b"),
-        ((1.09, 1.0, 2.0), "a"),
-        ((1.2, 1.11, 1.0), "c"),
-        ((np.inf,) * 3, "a"),
-    ],
-)
-def test_the_most_regularised_within_a_tenth_of_the_least_error_is_taken(
-    errors: tuple[float, ...], chosen: str
-) -> None:
-    assert most_regularised("abc", errors) == chosen
 
 
 def test_a_reference_ship_is_alike_by_a_correlation_of_a_half() -> None:
@@ -373,66 +333,6 @@ def test_what_does_not_fit_is_refused(
         )
 
 
-def test_a_feature_that_never_moves_is_left_out_of_the_bands() -> None:
-    """Its coefficient is 0, and the others are as without it."""
-    rng = np.random.default_rng(0)
-    X = rng.standard_normal((60, 2))
-    y = X @ [1.0, -2.0] + 0.01 * rng.standard_normal(60)
-    settings: dict[str, Any] = {"C": 100.0, "epsilon": 0.01}
-    alone = RMSVM(**settings).fit(X, y)
-    still = RMSVM(**settings).fit(np.column_stack([X, np.zeros(60)]), y)
-    np.testing.assert_allclose(still.coef_, [*alone.coef_, 0.0], atol=1e-3)
-    np.testing.assert_allclose(alone.coef_, [1.0, -2.0], atol=0.05)
-
-
-def test_the_error_of_a_heading(target: ShipModel, trials: list[Trial]) -> None:
-    """Correlation is blind to scale and offset; a straight course shows no zigzag."""
-    trial = trials[0]
-    assert heading_error(target, trial, "rmse") < np.radians(0.1)
-    assert heading_error(target, trial, "correlation") == pytest.approx(0.0, abs=1e-5)
-    larger = trial.with_channels({"psi": 1.5 * trial["psi"]})
-    size = np.sqrt(np.mean(trial["psi"] ** 2))
-    assert heading_error(target, larger, "rmse") == pytest.approx(0.5 * size, rel=0.02)
-    assert heading_error(target, larger, "correlation") < 1e-5
-    straight = trial.with_channels({"psi": np.zeros(len(trial))})
-    assert heading_error(target, straight, "correlation") == 1.0
-    wild = shipgym.load_model("mariner-tls-svm")
-    growing = np.array(list((wild.coefficients | {"N_r": 9.0}).values()))
-    lost = wild.with_coefficients(growing)
-    assert heading_error(lost, trial, "rmse") == np.inf
-
-
-def test_bands_are_searched_for_only_where_none_is_given(
-    target: ShipModel, trials: list[Trial]
-) -> None:
-    for method in (
-        RMSVM(C=1.0, epsilon=0.3),
-        RMSVM(C=0.0),
-    ):
-        result = fit(target, trials, method=method, reference_model="kvlcc2")
-        assert result.searches == {}
-        chosen = (result.model.provenance or {})["search"]["r"]
-        assert chosen == {"C": method.C, "epsilon": method.epsilon or 0.1}
-
-
-def test_a_correction_without_settings_has_a_weight_of_one_and_a_band_of_a_tenth() -> (
-    None
-):
-    X = np.random.default_rng(0).standard_normal((40, 2))
-    y = X @ [1.0, -2.0]
-    default, named, none = (
-        RMSVM(**given).fit(X, y)
-        for given in ({}, {"C": 1.0, "epsilon": 0.1}, {"C": 0.0})
-    )
-    np.testing.assert_array_equal(default.coef_, named.coef_)
-    assert none.coef_.tolist() == [0.0, 0.0]
-    weakest = RMSVM(C=0.01).fit(X, y)
-    np.testing.assert_array_equal(none.inverse_moment_, weakest.inverse_moment_)
-    np.testing.assert_allclose(
-        none.covariance_, np.mean(y**2) * weakest.inverse_moment_
-    )
-
-
 def test_the_most_similar_ship_is_not_taken_unnamed_where_she_is_not_alike() -> None:
     ship = Particulars(
         length=100.0,
@@ -452,24 +352,3 @@ def test_the_most_similar_ship_is_not_taken_unnamed_where_she_is_not_alike() -> 
     assert (box.ship.name, box.shaft, found) == ("kvlcc2", True, {})
     assert not chosen_box("kvlcc2", ship, [run])[0].shaft  # which is not recorded
     assert not chosen_box("kvlcc2", ship, [])[0].shaft
-
-
-def test_how_alike_ships_are_does_not_depend_on_the_units_of_what_is_compared() -> None:
-    """Features count by their norms over all ships; those not known of all do not."""
-    units = np.array([1.0, 20.0, 0.01, 300.0, 1.0])
-    target = np.array([0.8, 6.0, 2.5, 35.0, np.nan])
-    rows = {"one": [0.6, 7.0, 3.0, 20.0, 5.0], "other": [0.9, 5.5, 2.8, 40.0, 6.0]}
-    found = correlations(target, rows)
-    assert correlations(
-        units * target, {name: units * row for name, row in rows.items()}
-    ) == pytest.approx(found)
-    table = np.array([target, *rows.values()])[:, :4]
-    shares = table / np.sqrt(np.sum(table**2, axis=0))
-    assert found == pytest.approx(
-        {n: np.corrcoef(shares[0], shares[k])[0, 1] for k, n in enumerate(rows, 1)}
-    )
-    with pytest.raises(
-        InputError,
-        match=r"expected at least 3 of block coefficient, .* got 2",
-    ):
-        correlations([0.8, 6.0, np.nan, np.nan, np.nan], rows)

@@ -15,12 +15,10 @@ from identification import (
     IdentificationResult,
     Options,
     Sampling,
-    TunedLSSVM,
     Uncertainty,
     identify,
     write_report,
 )
-from identification.pipeline.options import changed_settings, name_of, plain
 from identification.pipeline.pose import pose
 from shipgym import InputError, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
@@ -353,34 +351,6 @@ def test_an_argument_that_does_not_exist_is_refused(cao_zigzag: Trial) -> None:
         identify([cao_zigzag], rank=3)  # type: ignore[call-arg]
 
 
-def test_service_speeds_that_are_not_given_are_the_median_of_those_at_the_start(
-    cao_zigzag: Trial,
-) -> None:
-    trials = [
-        cao_zigzag.with_(name=name).with_channels(
-            {"u": cao_zigzag["u"] + faster, "n": np.full(len(cao_zigzag), shaft)}
-        )
-        for name, faster, shaft in (("a", 0.3, 1.0), ("b", 0.0, 3.0), ("c", 0.1, 2.0))
-    ]
-    known: Any = {"length": 160.93, "speed": 7.5}
-    found = pose(trials, Options(structure="nomoto", particulars={"length": 160.93}))
-    assert found.blank.particulars.speed == trials[2]["u"][0]
-    assert found.blank.particulars.estimated == {"speed"}
-    assert found.blank.service_shaft_speed == 0.0  # which nomoto does not know
-    given = pose(trials, Options(structure="surge", particulars=known)).blank
-    assert (given.particulars.speed, given.service_shaft_speed) == (7.5, 2.0)
-    options = Options(structure="surge", particulars=known, service_shaft_speed=3.5)
-    assert pose(trials, options).blank.service_shaft_speed == 3.5
-
-    still = np.zeros(len(cao_zigzag))
-    rest = [cao_zigzag.with_(name="rest").with_channels({"u": still})]
-    idle = [cao_zigzag.with_(name="idle").with_channels({"n": still})]
-    with pytest.raises(InputError, match=r"trial 'rest': .*service speed in the"):
-        pose(rest, Options(structure="nomoto", particulars={"length": 160.93}))
-    with pytest.raises(InputError, match=r"'idle': .*give service_shaft_speed"):
-        pose(idle, Options(structure="surge", particulars=known))
-
-
 def test_for_a_form_of_the_yaw_rate_heading_and_rudder_suffice(
     cao_zigzag: Trial,
 ) -> None:
@@ -423,43 +393,6 @@ def test_least_squares_and_ls_svm_agree_where_there_is_no_noise(
     assert within_one_per_cent(fit, mariner) == 40
 
 
-def test_settings_are_recorded_as_json_knows_them(mariner: ShipModel) -> None:
-    """Infinity as null, arrays as lists, models by name, objects with settings."""
-    gear = SteeringGear(30.0, 2.0, 1.0)
-    found = plain(
-        {
-            "infinite": np.inf,
-            "array": np.arange(3),
-            "number": np.float64(2.5),
-            "nested": {"a": (1, np.nan)},
-            "model": mariner,
-            "gear": gear,
-            "stage": Sampling("euler", 3),
-            "method": LSSVM(C=7.0),
-        }
-    )
-    assert found == {
-        "infinite": None,
-        "array": [0, 1, 2],
-        "number": 2.5,
-        "nested": {"a": [1, None]},
-        "model": "mariner",
-        "gear": gear.to_dict(),
-        "stage": {"rule": "euler", "window": 3},
-        "method": {"name": "ls-svm", "C": 7.0, "scale": True, "robust": False},
-    }
-    json.dumps(found, allow_nan=False)
-    assert [name_of(one) for one in ("ls", mariner, LSSVM(), object())] == [
-        "ls",
-        "mariner",
-        "ls-svm",
-        "object",
-    ]
-    tuned = TunedLSSVM(optimiser="pso", seed=4)
-    assert changed_settings(tuned) == {"seed": 4}
-    assert changed_settings("ls") == {}
-
-
 def test_provenance_and_settings_tell_how_a_model_was_made(
     cao_zigzag: Trial, mariner: ShipModel
 ) -> None:
@@ -484,39 +417,3 @@ def test_provenance_and_settings_tell_how_a_model_was_made(
     assert fit.settings["method"]["C"] == 1e5
     assert fit.settings["uncertainty"]["model_error"] is False
     assert fit.settings["trials"][0]["sha256"] == cao_zigzag.sha256
-
-
-def test_provenance_says_whether_the_steering_gear_was_given(
-    cao_fit: IdentificationResult, cao_zigzag: Trial, mariner: ShipModel
-) -> None:
-    assert cao_fit.model.provenance is not None
-    assert cao_fit.model.provenance["steering"] == "estimated"
-    assert "uncertainty" not in cao_fit.model.provenance
-    fit = identify(
-        [cao_zigzag],
-        "nomoto",
-        "ls",
-        particulars=mariner.particulars,
-        steering=mariner.steering,
-    )
-    assert fit.model.provenance is not None
-    assert fit.model.provenance["steering"] == "given"
-    (trial,) = fit.model.provenance["trials"]
-    derived = sorted(cao_zigzag.derived)
-    assert trial == {
-        "name": cao_zigzag.name,
-        "sha256": cao_zigzag.sha256,
-        "derived": derived,
-    }
-    assert fit.model.provenance["ranks"] == {"r": 2}
-    assert "search" not in fit.model.provenance
-
-
-def test_a_grey_box_needs_the_channels_of_steering() -> None:
-    channels = {c: np.ones(3) for c in ("v", "r", "delta")}
-    run = Trial(np.arange(3.0), channels, name="deaf")
-    options = Options(
-        structure="grey-box", reference_model="mariner", particulars={"length": 7.0}
-    )
-    with pytest.raises(InputError, match="trial 'deaf': channel 'u' is missing"):
-        pose([run], options)

@@ -9,7 +9,6 @@ import pytest
 
 from identification import Uncertainty, identify
 from identification.judging.posterior import with_posterior
-from identification.judging.quadratic_map import quadratic_map
 from identification.judging.sampling import Chains, mixing_of, sample
 from identification.judging.warnings import model_warnings
 from identification.models.coefficient_prior import CoefficientPrior
@@ -48,20 +47,6 @@ def test_walkers_that_never_move_have_not_mixed():
     rng = np.random.default_rng(0)
     stuck = np.repeat(rng.standard_normal((1, 40, 2)), 50, axis=0)
     assert not mixing_of(Chains(stuck, 0.0)).is_enough
-
-
-def test_the_map_straightens_a_curved_valley():
-    """Of errors (x, 100 (y - x^2)): its points lie on the parabola."""
-
-    def errors(points):
-        x, y = points.T
-        return np.array([x, 100.0 * (y - x**2)])
-
-    jacobian = np.array([[1.0, 0.0], [0.0, 100.0]])
-    shape = quadratic_map(np.zeros(2), jacobian.T @ jacobian, jacobian, errors)
-    coordinates = np.array([[1.0, 0.0], [-2.0, 0.0], [0.5, 1.0]])
-    x, y = shape.points(coordinates).T
-    assert np.abs(y - x**2).max() < 0.011
 
 
 @pytest.fixture(scope="module")

@@ -60,20 +60,6 @@ def test_measured_velocities_and_short_records_stay():
     assert with_start(ship, short) is short
 
 
-def test_three_samples_within_one_and_a_half_ship_lengths_tell_a_start():
-    """At service speed these take the Mariner 31 s."""
-    ship = load_model("mariner")
-    turn = turning_circle(ship, 20.0, 300.0, 1.0)
-    for step, found in ((15, True), (16, False)):
-        rare = Trial(
-            turn.t[::step],
-            {name: turn[name][::step] for name in turn.channels},
-            length=turn.length,
-        )
-        log = as_derived(rare, {"r": 0.008})
-        assert (with_start(ship, log) is not log) == found
-
-
 def test_a_ship_that_runs_away_starts_as_was_recorded():
     ship = load_model("mariner")
     wild = replace(ship, coefficients=ship.coefficients | {"N_r": 1.0})
