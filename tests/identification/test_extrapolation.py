@@ -1,6 +1,5 @@
 """A hard turn that no trial shows: its error in the covariance, and what is taken."""
 
-
 import numpy as np
 import pytest
 
