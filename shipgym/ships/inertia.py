@@ -20,7 +20,7 @@ def inertia(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
         return _container(model)
     if model.structure == "tanker":
         return _tanker(model, water_depth)
-    if model.structure in ("kvlcc2", "mmg"):
+    if model.structure == "mmg":
         return _mmg(model)
 
     p = model.particulars.completed()
@@ -37,16 +37,10 @@ def rigid_inertia(model: ManoeuvringModel) -> tuple[float, float, float]:
         unit = _mass_unit(model.particulars.completed())
         L = model.particulars.length
         return c["m"] * unit, 0.0, c["Iz"] * unit * L**2
-    if model.structure == "kvlcc2":
-        mass = model.particulars["water_density"] * c["volume"]
-        gyradius = 0.25 * c["L"]
-        xg = c["xG"]
-    else:
-        p = model.particulars.completed()
-        mass = p.require("mass")
-        gyradius = p.require("yaw_gyradius")
-        xg = p.require("xg")
-    yaw = mass * (gyradius**2 + xg**2)
+    p = model.particulars.completed()
+    mass = p.require("mass")
+    xg = p.require("xg")
+    yaw = mass * (p.require("yaw_gyradius") ** 2 + xg**2)
     return mass, mass * xg, yaw
 
 
@@ -88,9 +82,8 @@ def _mmg(model: ManoeuvringModel) -> Floats:
     """Yasukawa & Yoshimura 2015: by rho L^2 d / 2, yaw inertia by rho L^4 d / 2."""
     c = model.coefficients
     p = model.particulars
-    L = c.get("L", p.length)
-    d = c["d"] if "d" in c else p.require("draught")
-    unit = 0.5 * p.require("water_density") * L**2 * d
+    L = p.length
+    unit = 0.5 * p.require("water_density") * L**2 * p.require("draught")
     m, m_xG, I_z = rigid_inertia(model)
     surge = m + c["mx"] * unit
     sway = m + c["my"] * unit

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import shipgym
-from shipgym import InputError, ShipModel, manoeuvres
+from shipgym import ShipModel, manoeuvres
 from shipgym.models.catalogue import container, kvlcc2, kvlcc2_l7, tanker
 from tests.shipgym.reference import table
 
@@ -317,30 +317,6 @@ def test_the_tanker_turns_wider_in_shallow_water():
 
 
 @pytest.mark.parametrize("name", ["container", "tanker", "kvlcc2", "kvlcc2-l7"])
-def test_without_thrust_and_rudder_a_ship_slows_down(name):
-    model = shipgym.load_model(name)
-    start = model.service_state.copy()
-    if "n" in model.state_names:
-        start[model.state_names.index("n")] = 0.0
-    trial = model.simulate(np.zeros((300, 2)), 0.1, start)
-    assert np.all(np.diff(trial["u"]) < 0.0)
-
-
-@pytest.mark.parametrize("name", ["container", "tanker", "kvlcc2"])
-def test_a_shaft_at_rest_is_the_limit_of_one_that_hardly_turns(name):
-    model = shipgym.load_model(name)
-
-    def rates(shaft):
-        state = dict(zip(model.state_names, model.service_state, strict=True))
-        state |= {"v": -0.5, "r": 0.004, "delta": 0.2} | (
-            {"n": shaft} if "n" in state else {}
-        )
-        return model.derivatives(list(state.values()), [0.2, shaft])[3:6]
-
-    np.testing.assert_allclose(rates(0.0), rates(1e-9), rtol=1e-6)
-
-
-@pytest.mark.parametrize("name", ["container", "tanker", "kvlcc2", "kvlcc2-l7"])
 def test_the_service_state_is_steady_straight_running(name):
     model = shipgym.load_model(name)
     rates = dict(
@@ -385,13 +361,3 @@ def test_each_ship_sails_in_the_environment(name):
         assert not terminated
     assert abs(info["heading_error"]) < np.radians(40.0)
     assert np.isfinite(reward)
-
-
-def test_depth_is_checked():
-    state, command = tanker().service_state, tanker().service_command
-    with pytest.raises(InputError, match=r"more than the draught of 18\.46 m"):
-        tanker().derivatives(state, command, water_depth=18.0)
-    with pytest.raises(InputError, match="deep-water"):
-        container().derivatives(container().service_state, command, water_depth=40.0)
-    with pytest.raises(InputError, match="deep-water"):
-        manoeuvres.zigzag(kvlcc2(), water_depth=40.0)

@@ -150,25 +150,3 @@ def test_a_rudder_without_effect_has_no_nomoto_form():
     A, _ = steering_state_space(MARINER)
     with pytest.raises(InputError, match="whose rudder has a steady effect"):
         nomoto_of(A, np.zeros((2, 1)))
-
-
-@pytest.mark.parametrize("name", ["mariner", "container", "kvlcc2", "kvlcc2-rm-svm"])
-def test_linear_dynamics_are_those_of_the_compiled_ship(name):
-    """Differences of `derivatives`, rolling aside.
-
-    Those of sway and yaw by the rudder.
-    """
-    ship = load_model(name)
-    at = straight_running(ship)
-    _, B = linearise(ship, at)
-    step = 1e-5
-    state = np.tile(at.state(ship), (2, 1))
-    names = ship.state_names
-    state[:, names.index("delta")] += [step, -step]
-    commands = np.tile(ship.service_command, (2, 1))
-    commands[:, 0] = state[:, names.index("delta")]
-    rates = ship.derivatives(state, commands)
-    by_rudder = (rates[0] - rates[1]) / (2.0 * step)
-    sway, yaw = by_rudder[names.index("v")], by_rudder[names.index("r")]
-    assert yaw == pytest.approx(B[1, 0], rel=0.05 if "phi" in names else 1e-4)
-    assert np.sign(sway) == np.sign(B[0, 0])

@@ -6,7 +6,6 @@ import pytest
 import shipgym
 from shipgym import InputError, ManoeuvreError, Trial, load_model, manoeuvres
 from shipgym.manoeuvres.execution import (
-    execute_time,
     reversals,
 )
 
@@ -23,13 +22,6 @@ def test_the_rudder_reverses_at_the_very_heading(mariner):
     np.testing.assert_allclose(coarse["psi"], fine["psi"][::10], atol=2e-4)
     on_steps = manoeuvres.zigzag(mariner, 20, 20, dt=0.5, switch="step")
     assert np.abs(on_steps["psi"] - fine["psi"][::10]).max() > 1e-3
-
-
-def test_port_first_starts_to_port(mariner):
-    trial = manoeuvres.zigzag(mariner, 10, 15, port_first=True)
-    assert trial["delta_command"][0] == pytest.approx(-np.radians(10))
-    assert trial["psi"][100] < 0
-    assert manoeuvres.switch_heading_deg(trial) == 15.0
 
 
 @pytest.fixture(scope="module")
@@ -70,42 +62,6 @@ def test_a_zigzag_cut_short_has_no_second_overshoot(triangle):
     indices = manoeuvres.zigzag_indices(cut)
     assert indices.overshoot_1_deg == pytest.approx(6.0)
     assert indices.overshoot_2_deg is None
-
-
-def test_measured_rudder_and_ordered_rudder_tell_the_same(mariner):
-    trial = manoeuvres.zigzag(mariner, 20, 20, dt=0.5)
-    measured = Trial(
-        trial.t, {n: trial[n] for n in ("psi", "u", "v", "delta")}, length=trial.length
-    )
-    ordered, seen = (
-        manoeuvres.zigzag_indices(trial),
-        manoeuvres.zigzag_indices(measured),
-    )
-    assert seen.overshoot_1_deg == pytest.approx(ordered.overshoot_1_deg, abs=1e-6)
-    assert seen.overshoot_2_deg == pytest.approx(ordered.overshoot_2_deg, abs=1e-6)
-    assert seen.initial_turning_lengths == pytest.approx(
-        ordered.initial_turning_lengths, abs=0.05
-    )
-
-
-def test_a_little_helm_or_noise_on_the_approach_is_not_the_execution():
-    t = np.arange(200.0)
-    order = np.where(t < 60.0, 0.0, np.where(t < 100.0, 10.0, -10.0))
-    helm = np.where(t < 60.0, 1.5 * np.sin(t / 3.0), order)
-    noisy = order + 0.5 * np.random.default_rng(0).standard_normal(len(t))
-    for delta in (helm, noisy):
-        assert 59.0 <= execute_time(Trial(t, {"delta": np.radians(delta)})) <= 60.0
-
-
-@pytest.mark.parametrize("offset", [-1.2, 1.2])
-def test_a_measured_rudder_whose_zero_is_off_reverses_when_ordered(
-    offset,
-):
-    run = manoeuvres.zigzag(load_model("mariner"), 10, 10, dt=1.0)
-    start, turns = reversals(Trial(run.t, {"delta": run["delta"]}))
-    assert len(turns) == len(reversals(run)[1])
-    found, moved = reversals(Trial(run.t, {"delta": run["delta"] + np.radians(offset)}))
-    assert [found, *moved] == pytest.approx([start, *turns], abs=0.01)
 
 
 @pytest.mark.parametrize("name", ["mariner", "tanker"])

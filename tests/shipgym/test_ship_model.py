@@ -237,36 +237,6 @@ def test_an_ellipsoid_holds_its_samples(angle, stretch, spread):
     assert envelope.distance(*away) == pytest.approx(3.0)
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        (
-            {"coefficients": {}},
-            r"expected the 40 of its structure; missing: .*X_u.*; unknown: none",
-        ),
-        (
-            {"covariance": np.eye(3)},
-            r"covariance of 'mariner': expected shape \(40, 40\), .* got \(3, 3\)",
-        ),
-    ],
-)
-def test_models_that_do_not_fit_together_are_refused(changes, message):
-    with pytest.raises(InputError, match=message):
-        replace(shipgym.load_model("mariner"), **changes)
-
-
-def test_coefficients_are_numbers_and_known():
-    mariner = shipgym.load_model("mariner")
-    with pytest.raises(InputError, match="X_u: expected a number, got nan"):
-        replace(mariner, coefficients=mariner.coefficients | {"X_u": np.nan})
-    with pytest.raises(InputError, match="missing: none; unknown: 'Z_u'"):
-        replace(mariner, coefficients=mariner.coefficients | {"Z_u": 1.0})
-    backwards = dict(reversed(mariner.coefficients.items()))
-    assert list(replace(mariner, coefficients=backwards).coefficients) == list(
-        mariner.coefficients
-    )
-
-
 def test_states_and_commands_that_are_none_are_refused():
     mariner, tanker = shipgym.load_model("mariner"), shipgym.load_model("tanker")
     state = mariner.service_state

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import shipgym
@@ -16,7 +15,7 @@ from shipgym.engine.motion import Motion, Ship
 from shipgym.ships import structures
 from shipgym.ships.structures import get_structure, list_structures
 from shipgym.ships.term_table import Structure
-from shipgym.ships.terms import Term, read_terms
+from shipgym.ships.terms import Term
 
 pytestmark = pytest.mark.interpreted
 
@@ -25,23 +24,6 @@ ABKOWITZ = get_structure("abkowitz")
 speeds = st.floats(2.0, 10.0)
 PRINTED = [name for name in list_structures() if name not in ("grey-box", "mmg")]
 FREE = [name for name in PRINTED if not get_structure(name).captive]
-
-
-@settings(max_examples=50, deadline=None)
-@given(speeds, st.floats(-3.0, 3.0), st.floats(-0.02, 0.02), st.floats(-0.7, 0.7))
-def test_features_times_coefficients_are_the_simulated_accelerations(u, v, r, delta):
-    model = shipgym.load_model("mariner")
-    theta = ABKOWITZ.acceleration_matrix(model.particulars) @ list(
-        model.coefficients.values()
-    )
-    expected, row = [], 0
-    for equation in ("u", "v", "r"):
-        channels = {"u": [u], "v": [v], "r": [r], "delta": [delta]}
-        features = ABKOWITZ.features(equation, channels, model.particulars)[0]
-        expected.append(features @ theta[row : row + len(features)])
-        row += len(features)
-    simulated = model.derivatives([0.0, 0.0, 0.3, u, v, r, delta], [delta])[3:6]
-    np.testing.assert_allclose(simulated, expected, rtol=1e-9, atol=1e-12)
 
 
 def virtual_ship(name: str, **coefficients: float) -> ShipModel:
@@ -173,19 +155,6 @@ def test_cubic_at_service_is_in_parts_of_service():
     assert rdot * 160.93**2 / U0**2 == pytest.approx(2.0 * 0.1**3)
 
 
-def test_forces_in_units_of_service_speed_meet_the_inertia_of_their_axis():
-    """Yaw alone: N' r' / (Iz' - N_rdot') with the Mariner's 83e-5."""
-    table = Structure("yaw", "own", {"r": read_terms("r, delta")}, "service", "force")
-    p = shipgym.load_model("mariner").particulars
-    matrix = table.acceleration_matrix(p)
-    np.testing.assert_allclose(
-        matrix * 83e-5,
-        np.diag([p["speed"] / p["length"], (p["speed"] / p["length"]) ** 2]),
-        rtol=2e-4,
-    )
-    assert table.coefficient_names == ("N_r", "N_d")
-
-
 def test_a_table_is_registered_in_a_line_and_saved_with_its_models(
     tmp_path, monkeypatch
 ):
@@ -298,48 +267,6 @@ def test_a_shaft_speed_is_asked_for_where_the_terms_have_one():
         get_structure("surge-perturbed").acceleration_matrix(
             Particulars(length=100.0, speed=5.0)
         )
-
-
-def test_the_terms_of_a_memory_belong_to_the_regression_of_yaw():
-    table = get_structure("nomoto2")
-    assert table.regressed == ("r",)
-    assert table.regression_names("r") == table.names("r") + table.names("q")
-    assert table.state_names == ("x", "y", "psi", "u", "v", "r", "q", "delta")
-    assert get_structure("nomoto").regression_names("r") == get_structure(
-        "nomoto"
-    ).names("r")
-
-
-@pytest.mark.parametrize(
-    ("name", "equations", "message"),
-    [
-        (
-            "nomoto",
-            {"r": "r, delta"},
-            "expected a new one, got 'nomoto', which is another",
-        ),
-        (
-            "kvlcc2",
-            {"r": "r, delta"},
-            "expected a new one, got 'kvlcc2', which is another",
-        ),
-        (
-            "grey-box",
-            {"r": "r, delta"},
-            "expected a new one, got 'grey-box', which is another",
-        ),
-        ("mine", {"r": 3}, "equations.r: expected formulas such as"),
-        (
-            "mine",
-            {"r": ["r", "delta"]},
-            "equations.r: expected a formula in one text, or Terms, got 'r'",
-        ),
-    ],
-)
-def test_names_of_others_and_what_is_no_formula_are_refused(name, equations, message):
-    with pytest.raises(InputError, match=message):
-        shipgym.register_structure(name, equations)
-    assert "mine" not in list_structures()
 
 
 def test_a_grey_box_is_no_structure_by_itself():

@@ -166,21 +166,3 @@ def test_a_draw_that_spins_as_no_ship_can_has_no_index():
     assert circle.evaluate(ship).advance_lengths > 3.0
     with pytest.raises(UnstableModelError, match="runs away after"):
         circle.evaluate(spins)
-
-
-def test_a_measured_turn_has_the_rudder_within_a_degree_and_a_tenth_of_the_speed():
-    ship = load_model("kvlcc2")
-    turn = turning_circle(ship, -35.0, duration=1200.0, dt=1.0)
-    for rudder, speed, counts in (
-        (34.05, 1.0, True),
-        (33.95, 1.0, False),
-        (35.0, 0.905, True),
-        (35.0, 0.895, False),
-    ):
-        changed = {name: speed * turn[name] for name in ("u", "v")}
-        changed |= {
-            name: rudder / 35.0 * turn[name] for name in ("delta", "delta_command")
-        }
-        assert (
-            "advance" in measured_indices(ship, turn.with_channels(changed))
-        ) == counts

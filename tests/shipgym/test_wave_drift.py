@@ -107,23 +107,6 @@ def test_waves_push_to_lee_and_turn_the_ship_beam_on(ship):
     np.testing.assert_allclose(drift.N, -drift.N[mirror], atol=1e-9 * abs(drift.N[bow]))
 
 
-def test_drift_scales_by_froude():
-    scale = 40.0
-    ship = {"length": 320.0, "beam": 58.0, "draught": 20.8}
-    model = {name: value / scale for name, value in ship.items()}
-    large = wave_drift(
-        Waves(3.0, 9.0), Particulars(**ship, block_coefficient=0.81, speed=7.0)
-    )
-    small = wave_drift(
-        Waves(3.0 / scale, 9.0 / scale**0.5),
-        Particulars(**model, block_coefficient=0.81, speed=7.0 / scale**0.5),
-    )
-    np.testing.assert_allclose(large.X, small.X * scale**3, rtol=1e-7, atol=1e-3)
-    np.testing.assert_allclose(large.Y, small.Y * scale**3, rtol=1e-7, atol=1e-3)
-    np.testing.assert_allclose(large.N, small.N * scale**4, rtol=1e-7, atol=1.0)
-    assert large.time_constant == pytest.approx(small.time_constant * scale**0.5)
-
-
 @pytest.mark.parametrize("ship", SHIPS)
 @pytest.mark.parametrize("state", ["slight", "moderate", "rough"])
 def test_eight_harmonics_of_the_drift_suffice_in_a_spread_sea(ship, state):
@@ -184,12 +167,6 @@ def test_mobility_is_the_inverse_of_inertia(ship):
         matrix[:3, :3] @ inertia(model)[:, :3], np.eye(3), atol=1e-9
     )
     assert np.abs(matrix[3]).max() == np.abs(matrix[:, 3]).max() == 0.0
-
-
-def test_shallow_water_makes_the_tanker_heavier():
-    tanker = load_model("tanker")
-    deep, shallow = mobility_matrix(tanker), mobility_matrix(tanker, water_depth=25.0)
-    assert (np.diag(shallow)[:3] < np.diag(deep)[:3]).all()
 
 
 def test_a_structure_without_surge_and_sway_only_turns():

@@ -5,14 +5,9 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from scipy.linalg import expm
 
 import shipgym
 from shipgym import InputError, manoeuvres
-from shipgym.engine import random
-from shipgym.engine.motion import Motion
 from shipgym.envs.engine import Engine
 from shipgym.models.simulate import simulate
 from shipgym.sea import (
@@ -21,14 +16,11 @@ from shipgym.sea import (
     Waves,
     Weather,
     Wind,
-    filters,
-    open_sea,
-    series,
     wave_motion,
     wind_curves,
 )
 from shipgym.sea.mobility import mobility_matrix
-from shipgym.sea.open_sea import Sea, SeaParameters
+from shipgym.sea.wind import gust_filter
 from shipgym.tasks.task import course_keeping_task
 from shipgym.trials.sensors import Sensors
 
@@ -39,7 +31,6 @@ GALE = Weather(
     name="gale",
 )
 STATE = ("x", "y", "psi", "u", "v", "r", "delta")
-OSCILLATOR = ("displacement", "velocity")
 
 
 @pytest.fixture(scope="module")
@@ -136,12 +127,6 @@ def test_weather_from_port_is_the_mirror_image_of_that_from_starboard(mariner):
         )
 
 
-def test_the_air_a_ship_meets_in_her_own_way_is_in_her_model_already(mariner):
-    """The least wind there is changes nothing: still air is no force."""
-    windy = ahead(mariner, steady_wind(0.0, 1e-6), 100)
-    np.testing.assert_allclose(windy["u"], ahead(mariner, steps=100)["u"], rtol=1e-7)
-
-
 @pytest.mark.parametrize("dt", [0.2, 1.0])
 def test_heading_in_waves_has_the_variance_and_the_rhythm_of_the_filter(mariner, dt):
     """In waves too low to push a ship off her course.
@@ -171,110 +156,6 @@ def test_heading_in_waves_has_the_variance_and_the_rhythm_of_the_filter(mariner,
     assert np.mean(psi[lag:] * psi[:-lag]) / psi.var() == pytest.approx(
         expected, abs=4.0 * error
     )
-
-
-NO_SINES, NO_COSINES = series.Sines(*[0.0] * 6), series.Cosines(*[0.0] * 7)
-NO_FILTER = filters.Filter(1.0, 0.0, 0.0)
-
-
-def parameters(**given):
-    """A sea of 10 s waves, lightly damped, without anything else but what is given."""
-    w, damping = 0.628, 0.1
-    none = {
-        name: NO_FILTER if name in ("current", "gust", "drift") else 0.0
-        for name in SeaParameters._fields
-    } | {
-        name: NO_COSINES if name.endswith(("surge", "variance")) else NO_SINES
-        for name in SeaParameters._fields[12:]
-    }
-    waves = {"wave_frequency": w, "wave_number": w * w / 9.81, "wave_damping": damping}
-    return SeaParameters(
-        **none
-        | waves
-        | {"wave_ringing": np.sqrt(1 - damping**2), "still_air": 0.0}
-        | given
-    )
-
-
-angle, few = st.floats(-3.1, 3.1), st.floats(-2.0, 2.0)
-
-
-@given(st.floats(0.0, 2.0))
-def test_an_oscillator_in_waves_steps_exactly(turn):
-    """Its transition is the matrix exponential; its noise keeps both variances at 1."""
-    p = parameters()
-    step = filters.oscillator_step(turn, p.wave_damping, p.wave_ringing)
-    p11, p12, p22, n11, n12, n22 = step
-    transition = np.array([[p11, p12], [-p12, p22]])
-    exact = expm(turn * np.array([[0.0, 1.0], [-1.0, -2.0 * p.wave_damping]]))
-    np.testing.assert_allclose(transition, exact, atol=2e-7)
-    noise = np.array([[n11, n12], [0.0, n22]])
-    np.testing.assert_allclose(noise @ noise.T, np.eye(2) - exact @ exact.T, atol=2e-6)
-    stepped = filters.stepped(filters.Oscillator(0.3, -0.7), 0.5, 1.1, step)
-    np.testing.assert_allclose(
-        stepped, exact @ [0.3, -0.7] + noise @ [0.5, 1.1], atol=1e-6
-    )
-
-
-def test_a_sea_begins_and_goes_on_as_it_always_was():
-    """Over 3,000 episodes every process has its deviation and mean, at the beginning
-    and 2 s later.
-    """
-    p = parameters(
-        current_speed=0.8,
-        current_towards=2.0,
-        wind_from=np.nan,
-        waves_from=np.nan,
-        current=filters.Filter(0.9, 0.3 * np.sqrt(0.19), 0.3),
-        gust=filters.Filter(0.8, 2.0 * 0.6, 2.0),
-        drift=filters.Filter(0.6, 0.5 * 0.8, 0.5),
-        heading_variance=series.Cosines(0.04, *[0.0] * 6),
-        roll_variance=series.Cosines(0.09, *[0.0] * 6),
-    )
-    motion, n = Motion(0.0, 0.0, 0.3, 5.0, *[0.0] * 7), 3000
-    begun, later = [], []
-    with np.errstate(over="ignore"):
-        for key in range(n):
-            word = random.rng_state(np.uint64(key), np.uint64(0))
-            begun.append(open_sea.begin_sea(motion, word, p))
-            after = word + random.BEGIN_WORDS
-            later.append(open_sea.evolve(motion, 2.0, begun[-1], after, p))
-    first, second = Sea(*np.array(begun).T), Sea(*np.array(later).T)
-
-    unit = dict.fromkeys(
-        [f"{motion}_{part}" for motion in ("heading", "roll") for part in OSCILLATOR],
-        (0.0, 1.0),
-    )
-    independent = unit | {
-        "current_north": (0.8 * np.cos(2.0), 0.3),
-        "current_east": (0.8 * np.sin(2.0), 0.3),
-        "gust": (0.0, 2.0),
-        "drift": (0.0, 0.5),
-    }
-    others = {
-        "psi_wave": (0.0, 0.2),
-        "phi_wave": (0.0, 0.3),
-        "wind_north": (0.0, np.sqrt(0.5)),
-        "wind_east": (0.0, np.sqrt(0.5)),
-    }
-    for name, (mean, deviation) in (independent | others).items():
-        error = 4.0 * deviation / np.sqrt(n)
-        for sea in (first, second):
-            values = getattr(sea, name)
-            assert values.mean() == pytest.approx(mean, abs=error), name
-            assert values.std() == pytest.approx(deviation, abs=error), name
-    for name, kept in (("current_north", 0.9), ("gust", 0.8), ("drift", 0.6)):
-        found = np.corrcoef(getattr(first, name), getattr(second, name))[0, 1]
-        assert found == pytest.approx(kept, abs=4.0 / np.sqrt(n)), name
-    columns = [getattr(second, name) for name in independent]
-    assert np.abs(np.corrcoef(columns) - np.eye(8)).max() < 5.0 / np.sqrt(n)
-
-    np.testing.assert_array_equal(first.wind_north, first.waves_north)
-    met = np.array([open_sea.encounter_frequency(motion, sea, p) for sea in later])
-    r_wave = -0.2 * met * second.heading_displacement
-    np.testing.assert_allclose(second.r_wave, r_wave, rtol=1e-9)
-    p_wave = -0.3 * met * second.roll_displacement
-    np.testing.assert_allclose(second.p_wave, p_wave, rtol=1e-9)
 
 
 def test_a_simulation_is_a_function_of_its_seed(mariner):
@@ -369,3 +250,20 @@ def test_wrong_weather(mariner):
         course_keeping_task(sea=7)
     with pytest.raises(InputError, match=r"seed: expected .*got -1"):
         ahead(mariner, "rough", 2, seed=-1)
+
+
+def test_current_and_gusts_have_their_variance(mariner):
+    T, steps, dt = 50.0, 20000, 2.0
+    weather = Weather(current=Current(1.0, 0.0, 0.3, T), wind=Wind(12.0, 0.0))
+    trial = ahead(mariner, weather, steps, dt)
+    error = 4.0 * sampling_error(T, steps * dt)
+    assert trial["current_north"].mean() == pytest.approx(1.0, abs=0.3 * error)
+    assert trial["current_east"].var() == pytest.approx(0.09, rel=error)
+    lag = round(T / dt)
+    east = trial["current_east"]
+    correlation = np.mean(east[:-lag] * east[lag:]) / 0.09
+    assert correlation == pytest.approx(np.exp(-1.0), abs=error)
+    gust = gust_filter(Wind(12.0, 0.0))
+    assert trial["wind_speed"].std() == pytest.approx(
+        gust.standard_deviation, rel=error
+    )
