@@ -1,6 +1,13 @@
-"""Late yaw rate and rudder in a log, and a rudder of the wrong sign."""
+"""Late channels of a log: yaw rate against heading, rudder against yaw acceleration.
+
+Each delay is that at which one channel explains the other best, by least squares over
+windows of some seconds, which is a band-pass: slower than that both are bound by the
+ship, faster is noise. The rudder's part in the yaw acceleration is instantaneous, all
+the rest of it follows from yaw rate, sway and their history.
+"""
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -8,32 +15,16 @@ import numpy as np
 
 from shipgym.arrays import Floats, integral
 from shipgym.errors import InputError
-from shipgym.trials.clock_offsets import (
-    LONGEST_DELAY_S,
-    ClockOffset,
-    clock_offset,
-    cycle_time,
-    reverses,
-    rudder_clock_offset,
-)
-from shipgym.trials.plausibility.refusal import Proposal, implausible
-from shipgym.trials.resampling import Log
+from shipgym.trials.resampling import Log, usual_step
 from shipgym.trials.units import DEGREE
 
-CERTAIN = 6.0  # standard errors by which a channel must explain the other
-
-
-class _Comparison(NamedTuple):
-    """A channel and what it is compared with."""
-
-    name: str
-    target: str
-    refused_s: float  # delay on one clock, less its error, that is refused
-
-
+LONGEST_DELAY_S = 10.0  # that is looked for
+_CERTAIN = 6.0  # standard errors by which a channel must explain the other
+#: Name of a channel, what it is compared with, and the delay on one clock, s, less its
+#: error, that is refused.
 _COMPARISONS = {
-    "r": _Comparison("the yaw rate", "the heading", 1.0),
-    "delta": _Comparison("the rudder", "the yaw acceleration", 1.5),
+    "r": ("the yaw rate", "the heading", 1.0),
+    "delta": ("the rudder", "the yaw acceleration", 1.5),
 }
 
 
@@ -47,36 +38,50 @@ class LateChannel(NamedTuple):
     @property
     def evidence(self) -> str:
         """Delay found, in words."""
-        comparison = _COMPARISONS[self.channel]
-        size = abs(self.delay)
+        name, target, _ = _COMPARISONS[self.channel]
         side = "late" if self.delay > 0.0 else "early"
         return (
-            f"{comparison.name} is {size:.2f} s {side} against"
-            f" {comparison.target} (standard error {self.error:.2f} s)"
+            f"{name} is {abs(self.delay):.2f} s {side} against {target} (standard error"
+            f" {self.error:.2f} s)"
         )
 
-    @property
-    def is_small(self) -> bool:
-        """True if the delay is left uncorrected on one clock by default."""
-        comparison = _COMPARISONS[self.channel]
-        return abs(self.delay) - self.error <= comparison.refused_s
+
+class ClockOffset(NamedTuple):
+    """Delay of a channel, and the certainty of the estimate."""
+
+    late: float  # s
+    error: float  # standard error, s
+    certainty: float  # the channel's gain in standard errors
 
 
 def find_late_channels(log: Log) -> list[LateChannel]:
-    """Yaw rate and rudder where a log shows that they are late.
-
-    Raises InputError for a rudder of the wrong sign, which is judged by a yaw rate only
-    where this does not contradict the heading.
-    """
-    found = _suspects(log)
-    if not found:
-        return []
+    """Yaw rate and rudder where a log shows that they are late."""
     believed = []
-    for suspect in found:
-        delays = _delays_with_more_noise(log, suspect.channel)
-        if _holds(suspect, delays):
+    for suspect in _suspects(log):
+        if _holds(suspect, _delays_with_more_noise(log, suspect.channel)):
             believed.append(suspect)
     return believed
+
+
+def is_corrected(
+    late: LateChannel, choice: str | None, where: str, *, is_one_clock: bool
+) -> bool:
+    """Decide whether a late channel is corrected, by `choice`, "correct" or "keep".
+
+    Without one, large delays of channels on one clock are an InputError, which begins
+    with `where`, small ones are left, and those of channels with clocks of their own
+    are corrected.
+    """
+    if choice is not None or not is_one_clock:
+        return choice != "keep"
+    _, _, refused_s = _COMPARISONS[late.channel]
+    if abs(late.delay) - late.error <= refused_s:
+        return False
+    raise InputError(
+        f"{where}: expected one clock, got one of which {late.evidence}; to have it"
+        ' corrected write clock_offsets = "correct" in [sensors] of the ship file, or'
+        ' "keep" if it is so'
+    )
 
 
 def _suspects(log: Log) -> list[LateChannel]:
@@ -84,40 +89,25 @@ def _suspects(log: Log) -> list[LateChannel]:
     rate = _rate_offset(log)
     rudder = _rudder_offset(log, rate)
     late = []
-    if rate is not None and rate.certainty >= CERTAIN:
-        late.append(_late("r", rate, dynamics_s=0.25))
+    if rate is not None and rate.certainty >= _CERTAIN:
+        dynamics_s = 0.25
+        error = math.hypot(rate.error, dynamics_s)
+        late.append(LateChannel("r", rate.late, error))
 
     # where the yaw rate is the derivative of a heading with noise
     certain_derived = 10.0
-    needed = CERTAIN if log.has("r") else certain_derived
+    needed = _CERTAIN if log.has("r") else certain_derived
     if rudder is not None and rudder.certainty >= needed:
-        suspect = _late_rudder(log, rudder)
-        if suspect is not None:
-            late.append(suspect)
+        cycle = cycle_time(log.t, log.channels["delta"])
+        # by which slow ships of other dynamics seem late
+        error = math.hypot(rudder.error, max(1.0, cycle / 300.0))
+        # an early rudder looks like that of a ship which answers slowly
+        cycles = 1.0 / 18.0 if rudder.late > 0.0 else 1.0 / 30.0
+        if abs(rudder.late) <= min(cycles * cycle, 0.9 * LONGEST_DELAY_S):
+            late.append(LateChannel("delta", rudder.late, error))
 
     significant = 2.5  # standard errors
     return [one for one in late if abs(one.delay) >= significant * one.error]
-
-
-def _late_rudder(log: Log, offset: ClockOffset) -> LateChannel | None:
-    """Delay of the rudder; None where it is long against the rudder's cycle."""
-    delta = log.channels["delta"]
-    cycle = cycle_time(log.t, delta)
-    # by which slow ships of other dynamics seem late
-    dynamics_s = max(1.0, cycle / 300.0)
-
-    # an early rudder looks like that of a ship which answers slowly
-    cycles = 1.0 / 18.0 if offset.late > 0.0 else 1.0 / 30.0
-    longest = min(cycles * cycle, 0.9 * LONGEST_DELAY_S)
-    if abs(offset.late) > longest:
-        return None
-    return _late("delta", offset, dynamics_s)
-
-
-def _late(channel: str, offset: ClockOffset, dynamics_s: float) -> LateChannel:
-    """Delay of a channel; `dynamics_s` is a standard error by the ship's dynamics."""
-    error = math.hypot(offset.error, dynamics_s)
-    return LateChannel(channel, offset.late, error)
 
 
 def _holds(suspect: LateChannel, delays: Floats) -> bool:
@@ -127,16 +117,12 @@ def _holds(suspect: LateChannel, delays: Floats) -> bool:
     extrapolation: Cook & Stefanski 1994), so the delay without noise is the first one
     less the change.
     """
-    is_found = np.isfinite(delays)
-    if is_found.mean() < 0.75:
+    found = delays[np.isfinite(delays)]
+    if found.size < 0.75 * delays.size:
         return False
-    found = delays[is_found]
-    middle = float(np.median(found))
-    spread = float(np.std(found))
-    change = middle - suspect.delay
-    noise = math.hypot(change, spread)
-    size = abs(suspect.delay)
-    return noise < 0.4 * size
+    change = float(np.median(found)) - suspect.delay
+    noise = math.hypot(change, float(np.std(found)))
+    return noise < 0.4 * abs(suspect.delay)
 
 
 def _delays_with_more_noise(log: Log, channel: str) -> Floats:
@@ -155,21 +141,12 @@ def _delays_with_more_noise(log: Log, channel: str) -> Floats:
             noise = white_noise(values) * random.standard_normal(values.size)
             channels[name] = values + noise
         noisy = replace(log, channels=channels)
-        offset = _offset_of(noisy, channel)
+        offset = _rate_offset(noisy)
+        if channel == "delta":
+            offset = _rudder_offset(noisy, offset)
         if offset is not None:
             delays[copy] = offset.late
     return delays
-
-
-def _offset_of(log: Log, channel: str) -> ClockOffset | None:
-    """Delay of one channel; None too where the rudder seems to have the wrong sign."""
-    rate = _rate_offset(log)
-    if channel == "r":
-        return rate
-    try:
-        return _rudder_offset(log, rate)
-    except InputError:
-        return None
 
 
 def white_noise(values: Floats) -> float:
@@ -181,117 +158,207 @@ def white_noise(values: Floats) -> float:
     return float(of_differences / gain)
 
 
-def is_corrected(
-    late: LateChannel, choice: str | None, where: str, *, is_one_clock: bool
-) -> bool:
-    """Decide whether a late channel is corrected, by `choice`, "correct" or "keep".
-
-    Without one, large delays of channels on one clock are an InputError, which begins
-    with `where`, small ones are left, and those of channels with clocks of their own
-    are corrected.
-    """
-    if choice is not None or not is_one_clock:
-        return choice != "keep"
-    if late.is_small:
-        return False
-    raise InputError(
-        f"{where}: expected one clock, got one of which {late.evidence}; to have it"
-        ' corrected write clock_offsets = "correct" in [sensors] of the ship file, or'
-        ' "keep" if it is so'
-    )
-
-
 def _rate_offset(log: Log) -> ClockOffset | None:
     """Delay of the yaw rate against the heading; None where a log does not show it."""
-    if not log.has("psi", "r"):
+    if not log.has("psi", "r") or not reverses(log.channels["r"]):
         return None
-    psi = log.channels["psi"]
-    r = log.channels["r"]
-    if not reverses(r):
-        return None
-    return clock_offset(log.t, target=psi, late=r, others={})
+    return clock_offset(log.t, log.channels["psi"], log.channels["r"], {})
 
 
 def _rudder_offset(log: Log, rate: ClockOffset | None) -> ClockOffset | None:
     """Delay of the rudder against the yaw rate, on the clock of the heading.
 
     None where the log does not show it.
-
-    InputError for a rudder of the wrong sign.
     """
     has_motion = log.has("psi") or log.has("r")
     if not log.has("delta") or not has_motion:
         return None
     delta = log.channels["delta"]
     if not reverses(delta, least=2.0 * DEGREE):
-        check_circle(log)
         return None
-
+    t = log.t
     if log.has("r"):
-        r = _rate_on_heading_clock(log, rate)
+        late = 0.0 if rate is None else rate.late
+        r = np.interp(t + late, t, log.channels["r"])
     else:
         # the same mean for both, so that one follows the other as before
-        r = _window_mean(log.t, log.channels["psi"])
-        delta = _window_mean(log.t, integral(log.t, delta))
-    rudder = rudder_clock_offset(log.t, r, delta)
-    if _is_against(rudder) and not _is_against(rate):
-        without_history = clock_offset(log.t, r, delta, {"r": r})
-        if _is_against(without_history):
-            raise _wrong_sign(log, "a yaw acceleration that follows the rudder")
-    return rudder
+        r = _window_mean(t, log.channels["psi"])
+        delta = _window_mean(t, integral(t, delta))
+    return rudder_clock_offset(t, r, delta)
 
 
 def _window_mean(t: Floats, total: Floats) -> Floats:
     """Mean over windows of 5 s of what adds up to a total, about each sample."""
-    length = 5.0  # s
-    half = 0.5 * length
-    begin = t - half
-    end = t + half
-    before = np.interp(begin, t, total)
-    after = np.interp(end, t, total)
-    added = after - before
-    mean: Floats = added / length
+    half = 2.5  # s
+    added = np.interp(t + half, t, total) - np.interp(t - half, t, total)
+    mean: Floats = added / (2.0 * half)
     return mean
 
 
-def _rate_on_heading_clock(log: Log, rate: ClockOffset | None) -> Floats:
-    """Yaw rate with its own delay taken out, rad/s."""
-    r = log.channels["r"]
-    if rate is None:
-        return r
-    t = log.t
-    on_time = t + rate.late
-    return np.interp(on_time, t, r)
+# ---- the delay of one channel against the change of another
 
 
-def _is_against(offset: ClockOffset | None) -> bool:
-    """Return whether a channel surely acts with the opposite sign."""
-    return offset is not None and offset.gain < 0.0 and offset.certainty > CERTAIN
+class _Windows(NamedTuple):
+    """Windows of time in which channels are compared."""
+
+    t: Floats  # of the samples, s
+    centres: Floats
+    half: float  # of a window, s
+
+    def slope(self, values: Floats, delay: float = 0.0) -> Floats:
+        """Mean slope of sampled values over each window, that many seconds later."""
+        middle = self.centres + delay
+        begin = np.interp(middle - self.half, self.t, values)
+        end = np.interp(middle + self.half, self.t, values)
+        slope: Floats = (end - begin) / (2.0 * self.half)
+        return slope
 
 
-def check_circle(log: Log) -> None:
-    """Refuse a rudder held to one side while the ship turns to the other."""
-    if not log.has("psi"):
-        return
-    psi = log.channels["psi"]
-    delta = log.channels["delta"]
-    rudder = np.median(delta)
-    side = np.sign(rudder)
-    is_laid = abs(rudder) > 8.0 * DEGREE
-    stays_there = np.quantile(side * delta, 0.1) > 0.0
-    turned = psi[-1] - psi[0]
-    turns_away = side * turned < -60.0 * DEGREE
-    if is_laid and stays_there and turns_away:
-        raise _wrong_sign(log, "a ship that turns away from the rudder,")
+def clock_offset(
+    t: Floats, target: Floats, late: Floats, others: Mapping[str, Floats]
+) -> ClockOffset | None:
+    """Delay of a channel against the change of a target; None where it cannot be found.
 
+    Parameters
+    ----------
+    t : ndarray of shape (n_samples,)
+        Time, s.
+    target : ndarray of shape (n_samples,)
+        Differentiated over windows of time.
+    late : ndarray of shape (n_samples,)
+        The channel.
+    others : mapping of str to ndarray of shape (n_samples,)
+        What explains the change of the target together with the channel.
+    """
+    windows = _windows(t)
+    if windows is None:
+        return None
+    known = _known_directions(windows, others)
+    change = _unexplained(windows.slope(target), known)
+    channel = integral(t, late)
 
-def _wrong_sign(log: Log, found: str) -> InputError:
-    """Error of a rudder that is positive to port."""
-    return implausible(
-        log.where,
-        f"expected a positive rudder to turn the bow to starboard, got {found} with the"
-        " opposite sign",
-        'write rudder_positive = "port" in [conventions], or take it out if it stands'
-        " there",
-        Proposal("rudder_positive", "port"),
+    def residual(delay: float) -> Floats:
+        regressor = _unexplained(windows.slope(channel, delay), known)
+        tiny = 1e-300  # in place of zero, by which is divided
+        gain = float(regressor @ change) / max(float(regressor @ regressor), tiny)
+        left: Floats = change - gain * regressor
+        return left
+
+    delays = np.arange(-LONGEST_DELAY_S, LONGEST_DELAY_S + 0.1, 0.25)
+    squares = np.array([float(np.sum(residual(delay) ** 2)) for delay in delays])
+    power = float(change @ change)
+    k = int(np.argmin(squares))
+    if k in (0, delays.size - 1):
+        return None
+    around = slice(k - 1, k + 2)
+    half_curvature, slope, _ = np.polyfit(
+        delays[around] - delays[k], squares[around], deg=2
     )
+    curvature = 2.0 * float(half_curvature)
+    if curvature * float(delays[1] - delays[0]) ** 2 <= 1e-12 * power:
+        return None
+
+    at = float(delays[k] - slope / curvature)
+    left = residual(at)
+    least = max(float(left @ left), 1e-300)
+    free = _independent_samples(left, least)
+    return ClockOffset(
+        late=at,
+        error=math.sqrt(2.0 * least / free / curvature),
+        certainty=math.sqrt(free * max(power / least - 1.0, 0.0)),
+    )
+
+
+def _windows(t: Floats) -> _Windows | None:
+    """Windows one sample apart, inside the record for every delay.
+
+    None where there are too few or too many.
+    """
+    length = 5.0
+    margin = LONGEST_DELAY_S + length
+    first = t[0] + margin
+    last = t[-1] - margin
+    step = max(usual_step(t), 0.5)
+    if not 60.0 < (last - first) / step < 200_000.0:
+        return None
+    return _Windows(t, np.arange(first, last, step), max(0.5 * length, step))
+
+
+def _known_directions(windows: _Windows, others: Mapping[str, Floats]) -> Floats:
+    """Orthonormal basis of a constant and other channels, shape (n_windows, n)."""
+    smallest = 0.02  # singular value; what is less follows from the others
+    columns = [np.ones(windows.centres.size)]
+    for values in others.values():
+        columns.append(windows.slope(integral(windows.t, values)))
+    directions = np.column_stack(columns)
+    directions /= np.linalg.norm(directions, axis=0)
+    basis, sizes, _ = np.linalg.svd(directions, full_matrices=False)
+    return np.asarray(basis[:, sizes > smallest])
+
+
+def _unexplained(values: Floats, directions: Floats) -> Floats:
+    """Values less what orthonormal directions explain of them."""
+    left: Floats = values - directions @ (directions.T @ values)
+    return left
+
+
+def _independent_samples(residual: Floats, squares: float) -> float:
+    """Number of independent residuals, by the correlation of each with the next."""
+    correlation = max(float(residual[1:] @ residual[:-1]) / squares, 0.0)
+    share = (1.0 - correlation) / (1.0 + correlation)
+    return max(residual.size * share, 2.0)
+
+
+def rudder_clock_offset(t: Floats, r: Floats, delta: Floats) -> ClockOffset | None:
+    """Delay of the rudder against the yaw acceleration.
+
+    Yaw rate and the history of both explain the rest of the acceleration.
+    """
+    explained = {"r": r, "r^3": r**3}
+    for memory in (20.0, 80.0):
+        explained[f"r, {memory:g} s"] = _remembered(t, r, memory)
+        explained[f"delta, {memory:g} s"] = _remembered(t, delta, memory)
+    return clock_offset(t, target=r, late=delta, others=explained)
+
+
+def _remembered(t: Floats, values: Floats, memory: float) -> Floats:
+    """Values by a first-order low-pass, whose time constant is the memory, s."""
+    from scipy.signal import lfilter
+
+    even = np.linspace(t[0], t[-1], t.size)
+    decay = math.exp(-(even[1] - even[0]) / memory)
+    resampled = np.interp(even, t, values)
+    lagged = lfilter(b=[1.0 - decay], a=[1.0, -decay], x=resampled)
+    return np.interp(t, even, lagged)
+
+
+def reverses(values: Floats, least: float = 0.0) -> bool:
+    """Return whether a channel reverses three times or more, as in zigzags.
+
+    A single step shows no delay.
+    """
+    low, high = np.quantile(values, [0.02, 0.98])
+    if high - low <= least:
+        return False
+    sides = _sides(values)
+    return bool(np.count_nonzero(np.diff(sides[sides != 0.0])) >= 3)
+
+
+def cycle_time(t: Floats, values: Floats) -> float:
+    """Usual time from there and back to there of a channel that reverses, s."""
+    sides = _sides(values)
+    is_far = sides != 0.0
+    changes = np.diff(sides[is_far])
+    reversals = t[is_far][1:][changes != 0.0]
+    return 2.0 * float(np.median(np.diff(reversals)))
+
+
+def _sides(values: Floats) -> Floats:
+    """Side of the middle on which values are: 1, -1, or 0 near the middle.
+
+    A few values that are out of the usual do not count.
+    """
+    low, high = np.quantile(values, [0.02, 0.98])
+    from_middle = values - 0.5 * (low + high)
+    is_far = np.abs(from_middle) > 0.25 * (high - low)
+    return np.where(is_far, np.sign(from_middle), 0.0)

@@ -17,16 +17,15 @@ from shipgym.trials.column_values import (
     without_sentinels,
 )
 from shipgym.trials.columns import Column, Locator, choose_columns
-from shipgym.trials.missing_values import check_time, fill_missing
+from shipgym.trials.missing_values import REPAIR, check_time, fill_missing
 from shipgym.trials.navigation import local_metres
-from shipgym.trials.plausibility.clock_jumps import without_clock_jumps
-from shipgym.trials.plausibility.headings import check_heading, without_spikes
-from shipgym.trials.plausibility.positions import (
-    check_outliers,
-    check_track,
+from shipgym.trials.plausibility.values import (
+    check_heading,
+    check_ranges,
     find_outliers,
+    without_clock_jumps,
+    without_spikes,
 )
-from shipgym.trials.plausibility.ranges import check_ranges
 from shipgym.trials.readers.cell_texts import is_number
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.resampling import (
@@ -258,11 +257,16 @@ def _local_track(
     clock = t[rows]
     here = replace(locator, rows=rows)
     x, y = local_metres(lat, lon, origin=(lat[0], lon[0]))
-    check_track(clock, x, y, here)
-    is_far = find_outliers(clock, x, y)
-    if repair is None:
-        check_outliers(lat, lon, is_far, here)
-
+    is_far = find_outliers(clock, x, y, here)
+    if repair is None and is_far.any():
+        k = int(np.argmax(is_far))
+        raise InputError(
+            f"{here.place(k, 'lat')}: expected a position that a ship reaches from"
+            f" those before and after, got {lat[k]:.5f}, {lon[k]:.5f}, one of"
+            f" {np.count_nonzero(is_far)} outliers among {lat.size}; empty its cells,"
+            ' or leave such rows to be filled with repair = "interpolate"',
+            [REPAIR],
+        )
     is_near = ~is_far
     kept = rows[is_near]
     north[kept] = x[is_near]

@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipgym.arrays import Floats
-from shipgym.trials.resampling import usual_step
+from shipgym.arrays import Floats, integral
+from shipgym.errors import InputError
+from shipgym.trials.resampling import Log, usual_step
 from shipgym.trials.units import DEGREE
 
 #: Share of logs in which the side may be named wrongly: measured by
@@ -106,6 +107,24 @@ def rudder_sign(t: Floats, psi: Floats, delta: Floats) -> RudderSign:
     is_known = agree and best.is_clear and is_certain
     side = _side(best.gain) if is_known else None
     return RudderSign(side, best.certainty)
+
+
+def check_rudder_sign(log: Log) -> None:
+    """Refuse a rudder that is positive to port, by the turning that follows it."""
+    if not log.has("delta") or not (log.has("psi") or log.has("r")):
+        return
+    psi = log.channels.get("psi")
+    if psi is None:
+        psi = integral(log.t, log.channels["r"])
+    found = rudder_sign(log.t, psi, log.channels["delta"])
+    surely = 10.0  # standard errors, twice those of a guess: a refusal has to be right
+    if found.side == "port" and (found.turned or abs(found.certainty) > surely):
+        raise InputError(
+            f"{log.where}: expected a positive rudder to turn the bow to starboard, got"
+            f" the opposite sign ({found.reason}); write rudder_positive ="
+            ' "port" in [conventions], or take it out if it stands there',
+            [("rudder_positive", "port")],
+        )
 
 
 def _side(value: float) -> str:

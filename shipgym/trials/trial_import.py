@@ -13,10 +13,12 @@ from shipgym.trials.late_channels import (
     is_corrected,
 )
 from shipgym.trials.midship import to_project_conventions
-from shipgym.trials.plausibility.agreement import check_velocity, check_yaw_rate
+from shipgym.trials.plausibility.agreement import (
+    check_steps,
+    check_velocity,
+    check_yaw_rate,
+)
 from shipgym.trials.plausibility.over_ground import check_over_ground
-from shipgym.trials.plausibility.overlap import check_overlap
-from shipgym.trials.plausibility.sampling import check_steps, is_usual
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.recording import Recording, read_recording
 from shipgym.trials.resampling import (
@@ -25,8 +27,8 @@ from shipgym.trials.resampling import (
     Signals,
     on_one_clock,
     share_clock,
-    usual_step,
 )
+from shipgym.trials.rudder_sign import check_rudder_sign
 from shipgym.trials.units import QUANTITIES
 
 _NO_RUDDER = (
@@ -73,6 +75,7 @@ def import_tables(
         log, clock_remarks = _corrected(log, signals, late, conventions)
         motion_remarks += clock_remarks
     _check_agreement(log, first.locator, conventions)
+    check_rudder_sign(log)
 
     is_magnetic = any(table.magnetic for table in tables)
     offset = conventions.installation.heading_offset
@@ -115,8 +118,42 @@ def _on_first_clock(
     for name, (t, values) in other.signals.items():
         moved[name] = Signal(t + shift, values)
     time_column = other.locator.columns["t"]
-    check_overlap(known, moved, path, time_column.name)
+    _check_overlap(known, moved, str(path), time_column.name)
     return moved
+
+
+def _check_overlap(known: Signals, moved: Signals, path: str, column: str) -> None:
+    """Refuse a file that does not overlap in time with the others, all on one clock, s.
+
+    `column` is its column of the time.
+    """
+    (begin, end), (other_begin, other_end) = map(_span, (known, moved))
+    if other_begin < end and other_end > begin:
+        return
+    half_hour = 1800.0
+    largest_zone = 14.0 * 3600.0
+    shift = half_hour * round((other_begin + other_end - begin - end) / 2.0 / half_hour)
+    remedy = "name files that were written at the same time"
+    overlaps = other_begin - shift < end and other_end - shift > begin
+    if abs(shift) <= largest_zone and overlaps:
+        sign = "-" if shift < 0.0 else "+"
+        hours, minutes = divmod(int(abs(shift) // 60.0), 60)
+        remedy = (
+            "likely its clock is in another time zone: write"
+            f' t = {{ column = "{column}", zone = "{sign}{hours:02d}:{minutes:02d}" }}'
+        )
+    raise InputError(
+        f"{path}: expected a file of the same time as the other of this log, got one"
+        f" that begins {other_begin - begin:.6g} s after it and does not overlap with"
+        f" it; {remedy}"
+    )
+
+
+def _span(signals: Signals) -> tuple[float, float]:
+    """First and last time of channels, s."""
+    begins = [float(signal.t[0]) for signal in signals.values()]
+    ends = [float(signal.t[-1]) for signal in signals.values()]
+    return min(begins), max(ends)
 
 
 def _turn_rudder(signals: Signals) -> None:
@@ -138,9 +175,7 @@ def _check_motion(
     remarks = []
     if has_positions and not log.has("delta"):
         remarks.append(_NO_RUDDER)
-    step = usual_step(log.t)
-    if not is_usual(step):
-        remarks += check_steps(log.t, locator)
+    remarks += check_steps(log.t, locator)
     if has_positions or log.has("ground_north"):
         remarks += check_over_ground(log, conventions.installation, locator)
     return remarks

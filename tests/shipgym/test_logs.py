@@ -376,7 +376,7 @@ def test_a_circle_away_from_the_rudder_is_named(tmp_path):
     Trial(t, circle).to_csv(path := tmp_path / "circle.csv")
     with pytest.raises(
         InputError,
-        match=r'turns away from the rudder.*write rudder_positive = "port" in',
+        match=r'with the rudder to one side.*write rudder_positive = "port" in',
     ):
         Trial.from_csv(path)
     assert Trial.from_csv(path, rudder_positive="port")["delta"][0] == 0.5

@@ -44,7 +44,7 @@ def manoeuvre(t=T):
         "u": u,
         "v": v,
         "r": r,
-        "delta": 0.3 * np.sin(0.2 * t + 1.0),
+        "delta": 0.3 * np.sin(0.2 * t + 2.0),
     }
     return channels, {"north": north, "east": east}
 

@@ -12,7 +12,6 @@ from shipgym.trials.guesses.columns import ColumnGuess, guess_columns
 from shipgym.trials.guesses.sides import RudderSide, rudder_side
 from shipgym.trials.guesses.speeds import settle_speeds
 from shipgym.trials.installation import Installation
-from shipgym.trials.plausibility.refusal import Proposal
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.trial import Trial, trial_of
@@ -100,7 +99,7 @@ def guess_trial(path: str | Path, *, checksums: str = "optional") -> TrialGuess:
             return _undecided(table, columns, missing)
     conventions: dict[str, ConventionGuess] = {}
     decisions: list[Decision] = []
-    tried: set[Proposal] = set()
+    tried: set[tuple[str, str]] = set()
     while True:
         try:
             trial = _read(table, columns, conventions, decisions)
@@ -228,16 +227,15 @@ def _read(
 
 
 def _next_proposal(
-    error: InputError, columns: Mapping[str, ColumnGuess], tried: set[Proposal]
-) -> Proposal | None:
+    error: InputError, columns: Mapping[str, ColumnGuess], tried: set[tuple[str, str]]
+) -> tuple[str, str] | None:
     """First proposal of a refusal that was not tried and is no unit given by a name."""
     for name, value in error.instead:
-        proposal = Proposal(name, value)
         may_be_tried = name not in QUANTITIES  # a convention
         if name in columns:
             may_be_tried = not columns[name].is_named
-        if may_be_tried and proposal not in tried:
-            return proposal
+        if may_be_tried and (name, value) not in tried:
+            return name, value
     return None
 
 

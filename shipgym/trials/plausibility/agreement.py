@@ -12,10 +12,8 @@ import numpy.typing as npt
 from shipgym.arrays import Floats, integral
 from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
-from shipgym.trials.plausibility.refusal import Proposal, implausible
-from shipgym.trials.plausibility.sampling import likelier_time_units
-from shipgym.trials.resampling import Log
-from shipgym.trials.units import DEGREE, QUANTITIES, UNITS
+from shipgym.trials.resampling import Log, usual_step
+from shipgym.trials.units import DEGREE, QUANTITIES, UNITS, si_factor
 
 
 class GainFit(NamedTuple):
@@ -43,82 +41,87 @@ def check_yaw_rate(log: Log, locator: Locator) -> None:
     if is_other_motion or 0.2 < gain < 5.0:
         return
 
-    heading = locator.columns["psi"].name
-    rate = locator.columns["r"].name
-    columns = f"columns '{heading}' (heading) and '{rate}' (yaw rate)"
+    columns = "columns '{}' (heading) and '{}' (yaw rate)".format(
+        *(locator.columns[channel].name for channel in ("psi", "r"))
+    )
     if gain > 0.0:
         raise _other_rate(gain, columns, log.t, locator)
-    raise implausible(
-        locator.path,
-        f"expected {columns} to be positive when the bow turns to starboard (clockwise"
-        " seen from above), got opposite signs",
-        "change the sign of the column that is positive to port",
+    raise InputError(
+        f"{locator.path}: expected {columns} to be positive when the bow turns to"
+        " starboard (clockwise seen from above), got opposite signs; change the sign of"
+        " the column that is positive to port"
     )
 
 
 def _other_rate(gain: float, columns: str, t: Floats, locator: Locator) -> InputError:
     proposals = _nearest_units(gain, t, locator)
-    wrong = "of time"
-    declarations = []
-    for proposal in proposals:
-        declaration = locator.declaration(*proposal)
-        declarations.append(declaration)
-        if proposal.name != "t":
-            wrong = "of one of them"
-    alternatives = " or ".join(declarations)
-    return implausible(
-        locator.path,
-        f"expected {columns} to agree, got a heading that changes {gain:.3g} times as"
-        " fast as the yaw rate says",
-        f"likely a wrong unit {wrong}, declare {alternatives}",
-        *proposals,
+    is_time = all(channel == "t" for channel, _ in proposals)
+    wrong = "of time" if is_time else "of one of them"
+    alternatives = " or ".join(locator.declaration(*one) for one in proposals)
+    return InputError(
+        f"{locator.path}: expected {columns} to agree, got a heading that changes"
+        f" {gain:.3g} times as fast as the yaw rate says; likely a wrong unit {wrong},"
+        f" declare {alternatives}",
+        proposals,
     )
 
 
-def _nearest_units(gain: float, t: Floats, locator: Locator) -> list[Proposal]:
-    """Units of which one would bring heading and yaw rate together.
+def _nearest_units(gain: float, t: Floats, locator: Locator) -> list[tuple[str, str]]:
+    """Units of which one would bring heading and yaw rate together, by channel.
 
     Where none does and the unit of time is in doubt, that comes first: two units are
     wrong.
     """
-    gains = {}  # that are left with a unit
+    time_units = likelier_time_units(t, locator)
+    distances = {}  # of the gains that are left with a unit
     for unit, ratio in _other_units("psi", locator).items():
-        proposal = Proposal("psi", unit)
-        gains[proposal] = gain * ratio
-    for unit, ratio in _other_units("r", locator).items():
-        proposal = Proposal("r", unit)
-        gains[proposal] = gain / ratio
-    time_units = []
-    for unit, ratio in likelier_time_units(t, locator).items():
-        proposal = Proposal("t", unit)
-        gains[proposal] = gain / ratio
-        time_units.append(proposal)
-
-    distances = {}
-    for proposal, left in gains.items():
-        distances[proposal] = abs(math.log(left))
+        distances["psi", unit] = abs(math.log(gain * ratio))
+    for channel, units in (("r", _other_units("r", locator)), ("t", time_units)):
+        for unit, ratio in units.items():
+            distances[channel, unit] = abs(math.log(gain / ratio))
     nearest = min(distances.values())
     far = 0.5  # logarithm of the ratio of two rates that are not the same
     if time_units and nearest > far:
-        return time_units[:1]
-
-    proposals = []
-    for proposal, distance in distances.items():
-        if distance < nearest + 0.01:
-            proposals.append(proposal)
-    return proposals
+        return [("t", next(iter(time_units)))]
+    return [one for one, distance in distances.items() if distance < nearest + 0.01]
 
 
 def _other_units(channel: str, locator: Locator) -> dict[str, float]:
     """Units of a channel that were not declared, by how much larger they are."""
-    declared = locator.columns[channel].unit
-    quantity = QUANTITIES[channel]
-    factors = dict(UNITS[quantity])
-    own = factors.pop(declared)
-    ratios = {}
-    for unit, factor in factors.items():
-        ratios[unit] = factor / own
-    return ratios
+    factors = dict(UNITS[QUANTITIES[channel]])
+    own = factors.pop(locator.columns[channel].unit)
+    return {unit: factor / own for unit, factor in factors.items()}
+
+
+def likelier_time_units(t: Floats, locator: Locator) -> dict[str, float]:
+    """Units of time that make unusual steps usual, and how much longer they are.
+
+    None where the steps of the times, s, are usual already.
+    """
+    step = usual_step(t)
+    if is_usual(step):
+        return {}
+    declared = si_factor("t", locator.columns["t"].unit)
+    likelier = {
+        unit: UNITS["time"][unit] / declared for unit in ("s", "ms", "min", "h")
+    }
+    return {unit: scale for unit, scale in likelier.items() if is_usual(scale * step)}
+
+
+def is_usual(step: float) -> bool:
+    """Return whether rows are usual in a manoeuvre that are so far apart, s."""
+    return 0.01 <= step <= 10.0
+
+
+def check_steps(t: Floats, locator: Locator) -> list[str]:
+    """Remark on rows that are so far apart that the unit of time, s, may be wrong."""
+    units = list(likelier_time_units(t, locator))
+    if not units:
+        return []
+    return [
+        f"the rows are {usual_step(t):.4g} s apart, which is unusual in a manoeuvre; if"
+        f" the unit of time is wrong, declare {locator.declaration('t', units[0])}"
+    ]
 
 
 def check_velocity(log: Log, frame: str, locator: Locator) -> None:
@@ -140,13 +143,32 @@ def check_velocity(log: Log, frame: str, locator: Locator) -> None:
     is_off = declared.misfit > 0.03
     is_better = other.misfit < 0.2 * declared.misfit
     has_right_size = 0.8 < other.gain.real < 1.25
+    names = {one: locator.columns[one].name for one in "xyuv"}
     if is_off and is_better and has_right_size:
-        raise _other_frame(frame, other_frame, locator)
-
+        raise InputError(
+            f"{locator.path}: expected columns '{names['u']}' and '{names['v']}' to"
+            f" follow the positions as velocities in the {frame} frame (velocity_frame"
+            f' = "{frame}"), got velocities in the {other_frame} frame; declare'
+            f' velocity_frame = "{other_frame}"',
+            [("velocity_frame", other_frame)],
+        )
     gain = abs(declared.gain)
-    has_wrong_size = not 0.55 < gain < 1.8
-    if declared.misfit < 0.2 and has_wrong_size:
-        raise _other_speed(gain, log.t, locator)
+    if declared.misfit >= 0.2 or 0.55 < gain < 1.8:
+        return
+    time_units = []
+    for unit, scale in likelier_time_units(log.t, locator).items():
+        if 0.55 < gain / scale < 1.8:
+            time_units.append(("t", unit))
+    wrong = "'{x}', '{y}' or of '{u}', '{v}' (a knot is 0.514 m/s): declare it"
+    wrong = wrong.format(**names)
+    if time_units:
+        wrong = f"time, declare {locator.declaration(*time_units[0])}"
+    raise InputError(
+        f"{locator.path}: expected positions and velocities to agree, got a position"
+        f" that changes {gain:.3g} times as fast as the velocities say; likely a wrong"
+        f" unit of {wrong}",
+        time_units,
+    )
 
 
 def _fit_track(log: Log, velocity: npt.NDArray[np.complex128]) -> GainFit:
@@ -158,39 +180,6 @@ def _fit_track(log: Log, velocity: npt.NDArray[np.complex128]) -> GainFit:
     return _fit_changes(
         regressor=_at_windows(sailed),
         target=_at_windows(position),
-    )
-
-
-def _other_frame(frame: str, other: str, locator: Locator) -> InputError:
-    u = locator.columns["u"].name
-    v = locator.columns["v"].name
-    return implausible(
-        locator.path,
-        f"expected columns '{u}' and '{v}' to follow the positions as velocities in the"
-        f' {frame} frame (velocity_frame = "{frame}"), got velocities in the {other}'
-        " frame",
-        f'declare velocity_frame = "{other}"',
-        Proposal("velocity_frame", other),
-    )
-
-
-def _other_speed(gain: float, t: Floats, locator: Locator) -> InputError:
-    times = []
-    for unit, scale in likelier_time_units(t, locator).items():
-        if 0.55 < gain / scale < 1.8:
-            times.append(Proposal("t", unit))
-    if times:
-        declaration = locator.declaration(*times[0])
-        wrong = f"time, declare {declaration}"
-    else:
-        x, y, u, v = (locator.columns[channel].name for channel in "xyuv")
-        wrong = f"'{x}', '{y}' or of '{u}', '{v}' (a knot is 0.514 m/s): declare it"
-    return implausible(
-        locator.path,
-        "expected positions and velocities to agree, got a position that changes"
-        f" {gain:.3g} times as fast as the velocities say",
-        f"likely a wrong unit of {wrong}",
-        *times,
     )
 
 

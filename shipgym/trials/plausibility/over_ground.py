@@ -6,11 +6,11 @@ import numpy as np
 import numpy.typing as npt
 
 from shipgym.arrays import Floats
+from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.installation import Installation
 from shipgym.trials.instrument_offsets import heading_offset, straight_parts
-from shipgym.trials.plausibility.refusal import implausible
 from shipgym.trials.resampling import Log
 from shipgym.trials.units import DEGREE
 
@@ -41,69 +41,58 @@ def check_over_ground(
     fastest = np.quantile(speed, 0.95)
     slowest = 0.3  # m/s, of any manoeuvre
     if fastest < slowest:
-        raise implausible(
-            locator.path,
-            "expected a manoeuvre, got a ship that makes at most"
-            f" {fastest:.2g} m/s over ground: she is at berth or at anchor",
-            "read another log",
+        raise InputError(
+            f"{locator.path}: expected a manoeuvre, got a ship that makes at most"
+            f" {fastest:.2g} m/s over ground: she is at berth or at anchor; read"
+            " another log"
         )
     moving = speed > 0.3 * fastest  # a slow ship has no course
     if "psi" not in log.channels or np.count_nonzero(moving) < 3:
         return []
-    psi = log.channels["psi"][moving]
-    course = np.angle(velocity[moving])
     is_known = bool(installation.heading_offset)
-    check_course(psi, course, locator, offset_is_known=is_known)
+    psi = log.channels["psi"][moving]
+    fault = _heading_fault(psi, np.angle(velocity[moving]), offset_is_known=is_known)
+    if fault:
+        raise InputError(f"{locator.path}: expected a heading {fault}")
     return [] if is_known else check_compass(log, locator)
 
 
-def check_course(
-    psi: Floats, course: Floats, locator: Locator, *, offset_is_known: bool = False
-) -> None:
-    """Refuse a heading that copies, mirrors or is far from the course over ground.
+def _heading_fault(psi: Floats, course: Floats, *, offset_is_known: bool) -> str:
+    """Words for a heading that copies, mirrors or is far from the course over ground.
 
-    Both are in rad, of shape (n_samples,).
+    Both are in rad, of shape (n_samples,). Empty for a sound one.
     """
     apart = np.exp(1j * (course - psi))
-    mirrored = np.exp(1j * (course + psi))
     mean = apart.mean()
-    agreement, mirrored_agreement = abs(mean), abs(mirrored.mean())
+    agreement = abs(mean)
+    mirrored_agreement = abs(np.exp(1j * (course + psi)).mean())
     drift_deg = np.degrees(np.angle(apart))
     turned_deg = math.degrees(np.ptp(psi))
+    clockwise = "clockwise from north, got one that contradicts the course over ground"
 
     is_turning = turned_deg > 20.0
     if is_turning and np.sqrt(np.mean(drift_deg**2)) < 0.3:
-        raise implausible(
-            locator.path,
-            "expected a heading that differs from the course over ground where a ship"
-            " drifts, got less than 0.3 deg of difference in a turn of"
-            f" {turned_deg:.0f} deg",
-            'name the gyro\'s column: psi = { column = "..." }',
+        return (
+            "that differs from the course over ground where a ship drifts, got less"
+            f" than 0.3 deg of difference in a turn of {turned_deg:.0f} deg; name the"
+            ' gyro\'s column: psi = { column = "..." }'
         )
     if is_turning and mirrored_agreement > max(0.95, agreement + 0.02):
-        raise implausible(
-            locator.path,
-            "expected a heading clockwise from north, got one that contradicts the"
-            " course over ground: it turns the other way",
-            "change the sign of its column",
-        )
+        return f"{clockwise}: it turns the other way; change the sign of its column"
     if offset_is_known:
-        return
-    drift = np.angle(mean) + np.angle(apart / mean)
-    offset = constant_offset(psi, drift)
+        return ""
+    offset = constant_offset(psi, np.angle(mean) + np.angle(apart / mean))
     largest_deg = 25.0
     if offset is None:
         offset = -float(np.angle(mean))
         largest_deg = 60.0  # to which ships may drift in a turn
-    if abs(offset) > largest_deg * DEGREE and agreement > 0.7:
-        offset_deg = math.degrees(offset)
-        raise implausible(
-            locator.path,
-            "expected a heading clockwise from north, got one that contradicts the"
-            f" course over ground by {offset_deg:.0f} deg",
-            f"name the right column, or write heading_offset_deg = {offset_deg:.0f} in"
-            " [sensors]",
-        )
+    offset_deg = math.degrees(offset)
+    if abs(offset_deg) <= largest_deg or agreement <= 0.7:
+        return ""
+    return (
+        f"{clockwise} by {offset_deg:.0f} deg; name the right column, or write"
+        f" heading_offset_deg = {offset_deg:.0f} in [sensors]"
+    )
 
 
 def constant_offset(psi: Floats, drift: Floats) -> float | None:
@@ -137,21 +126,17 @@ def constant_offset(psi: Floats, drift: Floats) -> float | None:
 
 def check_compass(log: Log, locator: Locator) -> list[str]:
     """Remark on a heading with a constant offset, or a magnetic one by its name."""
-    straight = straight_parts(log.t, log.channels)
-    found = heading_offset(log.channels, straight)
+    found = heading_offset(log.channels, straight_parts(log.t, log.channels))
     if found is not None and found.is_certain:
         offset_deg = round(found.offset / DEGREE, 1)
-        remark = (
+        return [
             f"the heading shows {offset_deg} deg too much on every course, as a"
             " magnetic compass or a gyro that is not aligned does; to remove it"
             f" write heading_offset_deg = {offset_deg} in [sensors]"
-        )
-        return [remark]
-    column = locator.columns["psi"].name
-    if "mag" in column.lower():
-        remark = (
+        ]
+    if "mag" in locator.columns["psi"].name.lower():
+        return [
             "the heading is magnetic by its name; write what it shows too much as"
             " heading_offset_deg"
-        )
-        return [remark]
+        ]
     return []

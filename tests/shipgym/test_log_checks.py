@@ -1,0 +1,373 @@
+"""What a log says is checked, put right where that is asked for, or refused."""
+
+import math
+
+import numpy as np
+import pytest
+
+from shipgym import InputError, ShipFile, Trial
+from shipgym.trials.late_channels import find_late_channels
+from shipgym.trials.resampling import Log
+
+NAN, DEGREE = math.nan, math.pi / 180.0
+
+
+def written(path, **columns):
+    """A CSV file, missing values as empty cells."""
+    rows = zip(*columns.values(), strict=True)
+    cells = [
+        ["" if math.isnan(one) else repr(float(one)) for one in row] for row in rows
+    ]
+    path.write_text("\n".join([",".join(columns), *map(",".join, cells)]) + "\n")
+    return path
+
+
+def refusal(path, **settings):
+    with pytest.raises(InputError) as caught:
+        Trial.from_csv(path, **settings)
+    return str(caught.value)
+
+
+T = np.arange(0.0, 200.0)
+TURN = 0.02 * T
+SWING = 0.5 * np.sin(0.05 * T)
+RATE = np.gradient(SWING)
+U, V = np.full(T.size, 5.0), np.zeros(T.size)
+X, Y = 5.0 * np.sin(TURN) / 0.02, 5.0 * (1.0 - np.cos(TURN)) / 0.02
+
+
+def at(values, row, value):
+    """Values with another one in a row."""
+    return np.where(np.arange(values.size) == row, value, values)
+
+
+@pytest.mark.parametrize(
+    ("columns", "message"),
+    [
+        ({"u": at(U, 3, -60.0)}, "line 5 (data row 4), column 'u': expected u of at"),
+        (
+            {"r": at(RATE, 3, 1.5)},
+            "got 1.5 rad/s (85.9437 deg/s); likely a wrong unit",
+        ),
+        ({"psi": np.where(T > 99.0, 1.1, 0.0)}, "within 1 s; empty the wrong cells"),
+        ({"psi": 57.3 * SWING}, 'declare psi = { column = "psi", unit = "deg" }'),
+        ({"psi": SWING, "r": -RATE}, "got opposite signs; change the sign of the"),
+        ({"psi": SWING, "r": RATE / 5.3}, "changes 5.3 times as fast as the yaw rate"),
+        (
+            {"psi": TURN, "x": X, "y": Y, "u": 0.514 * U, "v": V},
+            "a position that changes 1.95 times as fast as the velocities say; likely",
+        ),
+        (
+            {"psi": TURN, "x": X, "y": Y, "u": 5 * np.cos(TURN), "v": 5 * np.sin(TURN)},
+            'got velocities in the earth frame; declare velocity_frame = "earth"',
+        ),
+        ({"psi": SWING, "lat": 57 + 1e-8 * T, "lon": 11 + V}, "she is at berth or at"),
+        (
+            {"psi": SWING, "lat": at(57 + 5e-5 * T, 9, 58.0), "lon": 11 + V},
+            "line 11 (data row 10), column 'lat': expected a position that a ship",
+        ),
+        (
+            {"psi": SWING, "lat": 57 + 0.01 * (T % 2), "lon": 11 + V},
+            "expected the track of one ship, got a position that jumps",
+        ),
+        ({"psi": SWING, "sog": U, "cog": 1.2 + V}, "over ground by -40 deg; name the"),
+        ({"psi": TURN, "sog": U, "cog": TURN}, "less than 0.3 deg of difference in a"),
+        ({"psi": TURN, "sog": U, "cog": 0.1 - TURN}, "it turns the other way; change"),
+        ({"psi": TURN, "sog": U}, "columns: expected sog and cog, got sog alone"),
+        ({"psi": SWING, "delta": np.where(T < 50, NAN, 0.0)}, "expected a number, got"),
+        ({"ground": U}, "no column is named like a channel"),
+    ],
+)
+def test_what_no_ship_does_is_refused_with_a_remedy(tmp_path, columns, message):
+    assert message in refusal(written(tmp_path / "run.csv", t=T, **columns))
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        {"u": at(U, 3, 50.0)},
+        {"psi": at(SWING, 99, SWING[99] + 0.5)},  # an outlier of less than 30 deg
+        {"psi": SWING, "r": RATE / 4.7},
+        {"psi": SWING, "r": RATE + 0.001},  # a bias
+        {"psi": TURN, "x": X, "y": Y, "u": 0.57 * U, "v": V},
+        {"psi": TURN, "sog": U, "cog": TURN + 0.9},  # all of it may be drift
+        {"psi": SWING, "sog": U, "cog": SWING - 0.6 * np.cos(0.05 * T)},
+    ],
+)
+def test_what_a_ship_may_do_is_read(tmp_path, columns):
+    assert len(Trial.from_csv(written(tmp_path / "run.csv", t=T, **columns))) == T.size
+
+
+def test_an_outlier_of_the_heading_or_position_is_filled_and_counted(tmp_path):
+    columns = {"lat": at(57 + 5e-5 * T, 9, 58.0), "lon": 11 + V, "psi": at(V, 30, 1.0)}
+    path = written(tmp_path / "run.csv", t=T, **columns)
+    trial = Trial.from_csv(path, repair="interpolate")
+    assert trial.repaired == {"x": 1, "y": 1, "psi": 1}
+    np.testing.assert_allclose(np.diff(trial["x"]), 5.57, atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("step", "unit"), [(0.01, None), (10.0, None), (11.0, "ms"), (1.0 / 120.0, "min")]
+)
+def test_rows_unusually_far_apart_or_close_doubt_the_unit_of_time(tmp_path, step, unit):
+    path = written(tmp_path / "run.csv", t=step * T, psi=1e-4 * T)
+    notes = Trial.from_csv(path).notes
+    assert [f'unit = "{unit}"' in one for one in notes] == [True] * (unit is not None)
+
+
+@pytest.mark.parametrize(
+    ("offset_deg", "noise", "is_said"),
+    [(1.8, 0.0, False), (2.2, 0.0, True), (-2.2, 0.0, True), (2.2, 1.5, False)],
+)
+def test_an_offset_on_every_course_is_remarked_where_it_is_certain(
+    tmp_path, offset_deg, noise, is_said
+):
+    """From 2 degrees and four standard errors on; and taken out where asked for."""
+    t = np.arange(400.0)
+    course = np.interp(t, [195.0, 205.0], [0.2, 0.2 + 90.0 * DEGREE])
+    gusts = noise * np.random.default_rng(1).standard_normal((2, t.size))
+    velocity = 5.0 * np.exp(1j * course) + gusts[0] + 1j * gusts[1]
+    path = written(
+        tmp_path / "run.csv",
+        t=t,
+        psi=course + offset_deg * DEGREE,
+        delta=0.02 * np.ones(t.size),
+        sog=np.abs(velocity),
+        cog=np.angle(velocity),
+    )
+    notes = " ".join(Trial.from_csv(path).notes)
+    assert (f"write heading_offset_deg = {offset_deg:g} in" in notes) == is_said
+    if is_said:
+        sensors = dict.fromkeys(("heading_offset_deg", "rudder_offset_deg"), "estimate")
+        trial = Trial.from_csv(path, sensors=sensors)
+        np.testing.assert_allclose(trial["psi"], course, atol=0.01)
+        np.testing.assert_allclose(trial["delta"], 0.0, atol=1e-12)
+
+
+# --- conventions
+
+
+def test_forces_and_motion_are_moved_from_the_centre_of_gravity_to_midship(tmp_path):
+    """Of a body that turns about a point 2 m ahead of midship."""
+    at_cg = {"x": 10.0, "y": 20.0, "psi": np.pi / 6, "v": 1.0, "r": 0.1, "u": 3.0}
+    columns = {name: np.full(4, one) for name, one in at_cg.items()}
+    columns["psi"] = columns["psi"] + 0.1 * np.arange(4.0)
+    path = written(tmp_path / "run.csv", t=np.arange(4.0), **columns)
+    trial = Trial.from_csv(path, origin="cg", xg=2.0)
+    assert trial["v"][0] == pytest.approx(0.8)
+    assert trial["x"][0] == pytest.approx(10.0 - math.sqrt(3.0))
+    assert trial["y"][0] == pytest.approx(19.0)
+    for name, other in (("v", "r"), ("x", "psi"), ("N", "Y")):
+        written(path, t=np.arange(4.0), **{name: np.zeros(4)})
+        message = f"expected {other} to move {name} to mid"
+        assert message in refusal(path, origin="cg", xg=2.0)
+
+
+@pytest.mark.parametrize("turned_deg", [30.0, 300.0])
+def test_a_current_is_what_speed_over_ground_has_more_than_the_log(
+    tmp_path, turned_deg
+):
+    """A ship without leeway, in a current of 0.5 m/s north and 0.2 m/s west."""
+    psi = np.linspace(0.3, 0.3 + turned_deg * DEGREE, T.size)
+    velocity = 6.0 * np.exp(1j * psi) + 0.5 - 0.2j
+    ground = {"sog": np.abs(velocity), "cog": np.angle(velocity)}
+    stw = np.full(T.size, 6.0)
+    path = written(tmp_path / "run.csv", t=T, psi=psi, stw=stw, **ground)
+    trial = Trial.from_csv(path)
+    np.testing.assert_allclose(trial["v"], 0.0, atol=1e-9)
+    assert "0.54 m/s (1.05 kn) toward 338 deg, 0.00 m/s" in " ".join(trial.notes)
+
+
+def test_a_heading_follows_from_its_rate_where_there_is_no_position(tmp_path):
+    t = np.arange(9.0)
+    trial = Trial.from_csv(written(tmp_path / "run.csv", t=t, r=0.01 + 0.01 * t))
+    np.testing.assert_allclose(trial["psi"], 0.01 * t + 0.005 * t**2, atol=1e-12)
+    assert trial.derived == {"psi"}
+
+
+# --- clocks
+
+
+def test_channels_at_different_rates_are_read_each_where_it_has_values(tmp_path):
+    path = tmp_path / "run.csv"
+    rows = [f"{k / 2},{1.0 + k / 10},{'' if k % 2 else k / 2}" for k in range(20)]
+    path.write_text("\n".join(["t,u,x", *rows]))
+    trial = Trial.from_csv(path)
+    np.testing.assert_allclose(trial.t, np.arange(10.0))  # the slower one's
+    np.testing.assert_allclose(trial["u"], 1.0 + trial.t / 5.0)
+    swapped = [rows[0], rows[1], rows[4], rows[3], rows[2], *rows[5:]]
+    path.write_text("\n".join(["t,u,x", *swapped]))
+    assert "expected time to increase between values of 'x'" in refusal(path)
+
+
+@pytest.fixture(scope="module")
+def zigzag():
+    """Heading, yaw rate and rudder of a first-order ship, s and rad."""
+    t = np.arange(0.0, 400.0, 0.5)
+    delta = 0.3 * np.sign(np.sin(0.07 * t))
+    r = np.zeros(t.size)
+    for k in range(t.size - 1):
+        r[k + 1] = r[k] + 0.5 * (0.05 * delta[k] - r[k]) / 12.0
+    return {"t": t, "psi": np.cumsum(0.5 * r), "r": r, "delta": delta}
+
+
+@pytest.mark.parametrize("delay", [-3.0, 1.5, 4.0])
+def test_a_late_channel_is_named_left_or_corrected(tmp_path, zigzag, delay):
+    late = np.interp(zigzag["t"] - delay, zigzag["t"], zigzag["r"])
+    path = written(tmp_path / "run.csv", **{**zigzag, "r": late})
+    assert "expected one clock, got one of which the yaw rate is" in refusal(path)
+    errors = {}
+    for choice in ("keep", "correct"):
+        trial = Trial.from_csv(path, sensors={"clock_offsets": choice})
+        right = np.interp(trial.t, zigzag["t"], zigzag["r"])
+        errors[choice] = np.abs(trial["r"] - right)[20:-20].mean()
+    assert errors["correct"] < 0.2 * errors["keep"]
+
+
+def test_a_rudder_of_the_other_sign_is_refused(tmp_path, zigzag):
+    path = written(tmp_path / "run.csv", **{**zigzag, "delta": -zigzag["delta"]})
+    assert 'write rudder_positive = "port" in [conventions]' in refusal(path)
+    trial = Trial.from_csv(path, rudder_positive="port")
+    np.testing.assert_allclose(trial["delta"], zigzag["delta"])
+
+
+def zigzag_of_first_order(K, T, noise_deg, step, seed):
+    """Log of a 20/20 zigzag with T rdot + r = K delta and a noisy gyro compass."""
+    dt, rate = 0.1, 2.5 * DEGREE
+    random = np.random.default_rng(seed)
+    n = int(50.0 * T / dt)
+    psi, r, delta = np.zeros(n), np.zeros(n), np.zeros(n)
+    order = 20.0 * DEGREE
+    for k in range(n - 1):
+        if order * psi[k] > 0.0 and abs(psi[k]) >= abs(order):
+            order = -order
+        move = np.clip(order - delta[k], -rate * dt, rate * dt)
+        delta[k + 1] = delta[k] + move
+        r[k + 1] = r[k] + dt * (K * delta[k] - r[k]) / T
+        psi[k + 1] = psi[k] + dt * r[k + 1]
+    every = round(step / dt)
+    noise = noise_deg * DEGREE * random.standard_normal(psi[::every].size)
+    channels = {"psi": psi[::every] + noise, "delta": delta[::every]}
+    return Log(np.arange(noise.size) * step, channels, "log.csv", [])
+
+
+@pytest.mark.parametrize(("step", "noise_deg"), [(0.5, 0.1), (1.0, 0.2), (2.0, 0.5)])
+def test_a_noisy_compass_makes_no_rudder_late(noise_deg, step):
+    for seed, (K, lag) in enumerate([(0.15, 8.0), (0.05, 12.0), (0.08, 25.0)]):
+        log = zigzag_of_first_order(K, lag, noise_deg, step, seed)
+        for late in find_late_channels(log):
+            assert abs(late.delay) - late.error <= 1.5
+
+
+# --- parts of a log
+
+
+def cut_trials(folder, cut, t="t"):
+    delta = np.zeros(601)
+    for begin, end in ((100, 140), (190, 199)):  # quiet for under a minute
+        delta[begin:end] = 3.1 * DEGREE
+    delta[300:310] = 20.0 * DEGREE  # too short for a manoeuvre
+    delta[400:432] = -10.0 * DEGREE
+    rows = [f"{k},{34200 + k},{one!r}" for k, one in enumerate(delta.tolist())]
+    if t == "clock":
+        rows = [
+            f"{k},{9 + (1800 + k) // 3600:02d}:{(30 + k // 60) % 60:02d}:{k % 60:02d},"
+            f"{one!r}"
+            for k, one in enumerate(delta.tolist())
+        ]
+    (folder / "run.csv").write_text("\n".join(["t,clock,delta", *rows]))
+    (folder / "ship.toml").write_text(
+        f'[ship]\nlength = 100.0\n[columns]\nt = "{t}"\ndelta = "delta"\n'
+        f'[[trials]]\nfile = "run.csv"\ncut = {cut}\n'
+    )
+    return ShipFile.load(folder / "ship.toml").trials()
+
+
+@pytest.mark.parametrize(
+    ("cut", "t", "spans"),
+    [
+        ("[[10, 20], [30, 32]]", "t", [(10, 20), (30, 32)]),
+        ('[["09:31", "09:32"]]', "clock", [(60, 120)]),
+        ('"rudder"', "t", [(70, 228), (370, 461)]),
+    ],
+)
+def test_a_log_is_cut_into_trials(tmp_path, cut, t, spans):
+    trials = cut_trials(tmp_path, cut, t)
+    assert [(one.t[0], one.t[-1]) for one in trials] == spans
+
+
+@pytest.mark.parametrize(
+    ("cut", "t", "message"),
+    [
+        ("[[1, 2, 3]]", "t", 'trials]] 1 cut: expected cut = "rudder", or stretches'),
+        ("[[10, 11]]", "t", "from 0 to 600 s, got 10 to 11, which holds no trial"),
+        ("[[700, 800]]", "clock", "from 0 to 600 s, 09:30:00 to 09:40:00, got"),
+        ('[["09:31", "09:32"]]', "t", "which has no clock, got '09:31'"),
+        ('[["noon", "09:32"]]', "clock", "got 'noon'"),
+    ],
+)
+def test_a_cut_that_holds_no_trial_is_refused(tmp_path, cut, t, message):
+    with pytest.raises(InputError) as refused:
+        cut_trials(tmp_path, cut, t)
+    assert message in str(refused.value)
+
+
+# --- what is missing
+
+
+@pytest.mark.parametrize(
+    ("rows", "step", "is_refused"),
+    [(19, 1.0, False), (20, 1.0, True), (10, 9.0, False), (11, 9.0, True)],
+)
+def test_a_hole_is_too_long_with_more_than_ten_rows_over_more_than_twenty_steps(
+    rows, step, is_refused, tmp_path
+):
+    """Of 200 rows, 1 s apart but in the hole."""
+    steps = np.ones(199)
+    steps[99 : 100 + rows] = step
+    t = np.r_[0.0, np.cumsum(steps)]
+    psi = 0.001 * t
+    psi[100 : 100 + rows] = np.nan
+    path = written(tmp_path / "run.csv", t=t, psi=psi)
+    if is_refused:
+        found = refusal(path, repair="interpolate")
+        assert f"{rows} rows without a value, over {step * (rows + 1):g} s" in found
+        return
+    trial = Trial.from_csv(path, repair="interpolate")
+    np.testing.assert_allclose(trial["psi"], 0.001 * t, atol=1e-9)
+    assert trial.repaired == {"psi": rows}
+
+
+def test_half_of_the_rows_have_to_be_whole_to_fill_the_others(tmp_path):
+    """Rows without any value are holes, no channels at other rates."""
+    t = np.arange(20.0)
+    for count, is_refused in ((10, False), (11, True)):
+        u = 1.0 + 0.1 * t
+        u[np.linspace(1, 18, count).round().astype(int)] = np.nan
+        path = written(tmp_path / "run.csv", t=t, u=u)
+        if is_refused:
+            assert "got only 9; leave out" in refusal(path, repair="interpolate")
+            continue
+        trial = Trial.from_csv(path, repair="interpolate")
+        np.testing.assert_allclose(trial["u"], 1.0 + 0.1 * t)
+
+
+@pytest.mark.parametrize(("unit", "turn"), [("deg", 360.0), ("rad", 2.0 * math.pi)])
+def test_a_heading_is_filled_across_north(unit, turn, tmp_path):
+    psi = 0.97 + 0.01 * np.array([0.0, 1.0, NAN, 3.0, 4.0, 5.0])
+    path = written(tmp_path / "run.csv", t=np.arange(6.0), psi=psi % 1.0 * turn)
+    columns = {"psi": {"column": "psi", "unit": unit}}
+    trial = Trial.from_csv(path, columns, repair="interpolate")
+    expected = 2.0 * math.pi * (0.97 + 0.01 * np.arange(6.0))
+    np.testing.assert_allclose(trial["psi"], expected)
+
+
+def test_time_that_stands_still_or_goes_back_is_refused(tmp_path):
+    for t, message in (
+        ([0.0, 1.0, 1.0, 2.0], "line 4 (data row 3), column 't': expected time to"),
+        ([0.0, 1.0, 0.5, 2.0], "got one that goes back from 1 s to 0.5 s; sort the"),
+        ([0.0, 3600.0, 1.0, 2.0], "where a clock was set back, as at the end of"),
+        ([0.0, 1.0], "expected at least 3 rows below the header, got 2"),
+    ):
+        path = written(tmp_path / "run.csv", t=np.array(t), u=np.ones(len(t)))
+        assert message in refusal(path)
