@@ -12,9 +12,6 @@ from .design.reduction import (
 from .design.reduction import (
     backward_elimination as backward_elimination,
 )
-from .design.sensitivity import (
-    sensitivity as sensitivity,
-)
 from .estimators.kernel_residual import KernelResidual as KernelResidual
 from .estimators.lssvm import (
     LSSVM as LSSVM,

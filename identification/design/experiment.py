@@ -21,11 +21,11 @@ from identification.design.information import (
     fisher_information,
     noise_variance,
     relative_errors,
+    table_of,
     trial_information,
     trial_regression,
     uncertainty,
 )
-from identification.design.sensitivity import table_of
 from identification.models.hard_turn import hard_turn_features
 from identification.text import as_text, lined_table
 from shipgym import InputError, ShipModel, Trial, UnstableModelError

@@ -10,16 +10,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import by_name, mean_square
-from identification.design.sensitivity import table_of
 from identification.judging.diagnostics import (
     JITTER,
     scaled_features,
     variance_inflation,
 )
 from identification.samples.samples import Samples, build_samples
-from shipgym import ShipModel, Trial
+from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
+from shipgym.ships import Structure
 from shipgym.trials.resampling import usual_step
+
+
+def table_of(model: ShipModel) -> Structure:
+    """The table of terms of a model; InputError for equations written by hand."""
+    if not isinstance(model.dynamics, Structure):
+        raise InputError(
+            "structure: expected a table of terms, such as 'abkowitz', got"
+            f" {model.structure!r}"
+        )
+    return model.table
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,6 @@ from identification.design.reduction import (
     Reduction,
     backward_elimination,
 )
-from identification.design.sensitivity import zigzag_sensitivity
 from identification.pipeline import identify
 from identification.pipeline.result import IdentificationResult
 from identification.samples.samples import Samples
@@ -58,7 +57,6 @@ class ReducedIdentification:
                 "full": full.metrics["trials"],
                 "reduced": reduced.metrics["trials"],
             },
-            "sensitivity": zigzag_sensitivity(reduced.model),
         }
 
 

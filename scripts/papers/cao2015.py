@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
-from identification.design.sensitivity import sensitivity
 from identification.estimators.lssvm import LSSVM
 from identification.pipeline import identify
 from identification.samples.samples import build_samples
 from papers.row import Conclusion, Paper, Row
+from papers.sensitivity import sensitivity
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.models import ShipModel, load_model
 from shipgym.trials.trial import Trial

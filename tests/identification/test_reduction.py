@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,14 +12,13 @@ from identification.design.reduced import reduce, reduced_structure
 from identification.design.reduction import (
     backward_elimination,
 )
-from identification.design.sensitivity import sensitivity
 from shipgym import (
     InputError,
     Particulars,
     ShipModel,
     SteeringGear,
 )
-from shipgym.manoeuvres import turning_circle, zigzag
+from shipgym.manoeuvres import zigzag
 from shipgym.ships import get_structure
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
@@ -118,27 +116,6 @@ def test_the_terms_of_a_virtual_ship_are_found_among_more() -> None:
     np.testing.assert_allclose(found["r"].coefficients["c_d"], TRUE["c_d"], rtol=0.02)
 
 
-def test_the_sensitivity_to_nomoto_s_gain_is_the_motion_itself() -> None:
-    """Yaw rate and heading are proportional to the coefficient of the rudder."""
-    own = {"c_r": -1 / 30.0, "c_d": 0.05 / 30.0}
-    ship = ShipModel(
-        "virtual", "nomoto", PARTICULARS, SteeringGear(35.0, 5.0, 1.0), own
-    )
-    turn = partial(turning_circle, rudder_deg=20.0, duration=300.0, dt=0.5)
-    effects, base = sensitivity(ship, turn), turn(ship)
-    squares = [np.mean(base[c] ** 2) / np.ptp(base[c]) ** 2 for c in ("r", "psi")]
-    assert effects["c_d"] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-9)
-
-
-def test_a_coefficient_of_zero_has_no_effect_and_the_strongest_stands_first() -> None:
-    effects = sensitivity(
-        virtual_ship("steering7"), partial(turning_circle, duration=300.0, dt=0.5)
-    )
-    assert effects["b_|r|r"] == 0.0
-    assert effects["c_d"] > effects["b_d"] > 0.0
-    assert list(effects.values()) == sorted(effects.values(), reverse=True)
-
-
 def test_what_cannot_be_reduced_is_named() -> None:
     X, y = orthogonal()
     with pytest.raises(InputError, match="got 20 samples for 8 terms"):
@@ -161,6 +138,3 @@ def test_numbers_beyond_their_bounds_are_refused() -> None:
     for name in ("tolerance", "threshold"):
         with pytest.raises(InputError, match=f"{name}: expected"):
             backward_elimination(X, y, NAMES, **{name: -1.0})
-    for change in (0.0, 1.0):
-        with pytest.raises(InputError, match="change: expected"):
-            sensitivity(virtual_ship("steering7"), turning_circle, change)
