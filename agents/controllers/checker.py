@@ -139,58 +139,40 @@ class _Asking:
         seen_before = deepcopy(seen)
         state_before = deepcopy(state)
         answer: Any = self.controller.predict(seen, state, starts, True)
-        if not isinstance(answer, tuple) or len(answer) != 2:
-            got = type(answer).__name__
-            raise self._refusal(where, "a pair: action and state", got)
-        action, state_after = answer
-        action = self._checked(action, seen.shape[:-1], where)
+        is_pair = isinstance(answer, tuple) and len(answer) == 2
+        got = type(answer).__name__
+        self.require(is_pair, where, "a pair: action and state", got)
+        given, state_after = answer
+        action = self.checked(given, (*seen.shape[:-1], 1), where)
 
         for memory in (state, state_before):
             again, _ = self.controller.predict(seen, memory, starts, True)
-            self._check_repeated(again, action, where)
-        if not np.array_equal(seen_before, seen):
-            raise self._refusal(
+            self.require(
+                np.array_equal(np.asarray(again), action),
                 where,
-                expected="the observation left as it was",
-                got="a changed one; work on a copy",
-            )
-        return action, state_after
-
-    def _check_repeated(self, again: Any, action: Any, where: str) -> None:
-        """Refuse another action for the same state."""
-        if not np.array_equal(np.asarray(again), action):
-            raise self._refusal(
-                where,
-                expected=f"the same action for the same state, {np.ravel(action)}",
-                got=f"{np.ravel(again)}; what it remembers belongs into the state that"
+                f"the same action for the same state, {np.ravel(action)}",
+                f"{np.ravel(again)}; what it remembers belongs into the state that"
                 " predict returns, and deterministic=True allows no chance",
             )
+        is_kept = np.array_equal(seen_before, seen)
+        change = "a changed one; work on a copy"
+        self.require(is_kept, where, "the observation left as it was", change)
+        return action, state_after
 
-    def _checked(self, action: Any, rows: tuple[int, ...], where: str) -> Any:
+    def checked(self, action: Any, shape: tuple[int, ...], where: str) -> Any:
         """An action, which must be one finite number in [-1, 1] for each ship."""
         try:
             array = np.asarray(action, dtype=np.float64)
         except (TypeError, ValueError):
-            raise self._refusal(where, "numbers", f"{action!r}") from None
-        shape = (*rows, 1)
-        if array.shape != shape:
-            raise self._refusal(
-                where,
-                expected=f"an action of shape {shape}",
-                got=f"shape {array.shape}",
-            )
-        if not np.isfinite(array).all():
-            raise self._refusal(
-                where,
-                expected="finite numbers",
-                got=f"{array.ravel()}; look for a division by zero",
-            )
-        if np.abs(array).max() > 1.0:
-            raise self._refusal(
-                where,
-                expected="parts of the rudder limit in [-1, 1]",
-                got=f"{array.ravel()}",
-            )
+            array = np.array(np.nan)
+            self.require(False, where, "numbers", f"{action!r}")
+        fits = array.shape == shape
+        self.require(fits, where, f"an action of shape {shape}", f"shape {array.shape}")
+        got = f"{array.ravel()}"
+        hint = f"{got}; look for a division by zero"
+        self.require(np.isfinite(array).all(), where, "finite numbers", hint)
+        is_part = np.abs(array).max() <= 1.0
+        self.require(is_part, where, "parts of the rudder limit in [-1, 1]", got)
         return np.asarray(action)
 
     def check_same(self, found: Any, expected: Any, where: str) -> None:
@@ -198,13 +180,15 @@ class _Asking:
         # of the rudder limit: matrix products of learned policies depend on how many
         # rows there are
         rounding = 1e-5
-        if not np.allclose(found, expected, rtol=0.0, atol=rounding):
-            raise self._refusal(
-                where,
-                expected=f"{np.ravel(expected)} as otherwise",
-                got=f"{np.ravel(found)}; rows of a batch and episodes must be"
-                " independent of each other",
-            )
+        self.require(
+            np.allclose(found, expected, rtol=0.0, atol=rounding),
+            where,
+            f"{np.ravel(expected)} as otherwise",
+            f"{np.ravel(found)}; rows of a batch and episodes must be independent of"
+            " each other",
+        )
 
-    def _refusal(self, where: str, expected: str, got: str) -> InputError:
-        return InputError(f"{self.who}, {where}: expected {expected}, got {got}")
+    def require(self, is_met: Any, where: str, expected: str, got: str) -> None:
+        """Refuse a controller that does not meet a requirement."""
+        if not is_met:
+            raise InputError(f"{self.who}, {where}: expected {expected}, got {got}")

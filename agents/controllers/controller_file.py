@@ -14,7 +14,6 @@ from agents.controllers.interface import check_names
 from agents.controllers.margins import Margins
 from agents.controllers.registry import controller_class, controller_kinds
 from shipgym import InputError, ShipModel
-from shipgym.arrays import Floats
 from shipgym.checks import (
     check_array,
     check_choice,
@@ -26,6 +25,7 @@ from shipgym.checks import (
     placed,
     quoted,
     shown,
+    unexpected,
 )
 
 REMEDY = "design the controller again or take another copy"
@@ -52,21 +52,33 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
     Raises InputError, which names the field at fault.
     """
     design = _class_of(content, where)
-    expected = (*FIELDS, *_further_fields(design))
+    further = {
+        "arrays": bool(design.arrays),
+        "autopilot": design.has_autopilot,
+        "ship": design.has_ship,
+    }
+    expected = (*FIELDS, *[name for name, present in further.items() if present])
     check_keys(content, expected, where, expected)
-    names = _names(content["observation_names"], where)
-    further = tuple(name for name in design.may_observe if name in names)
-    check_names(names, design.observes + further, f"{where}: observation_names")
+    given = content["observation_names"]
+    if not isinstance(given, list):
+        raise unexpected(f"{where}: observation_names", "a list of names", given)
+    names = tuple(map(str, given))
+    more = tuple(name for name in design.may_observe if name in names)
+    check_names(names, design.observes + more, f"{where}: observation_names")
 
+    gains = dict.fromkeys(design.gain_names or design.feedback, ANY_NUMBER)
+    needed = {name: one for name, one in design.bounds.items() if name not in gains}
+    gains |= {name: one for name, one in design.bounds.items() if name in gains}
     rudder = Bounds(-np.pi, np.pi)  # rad
     with placed(where):
+        check_table(content["gains"], "gains", gains)
         return design(
-            gains=_gains(content["gains"], design),
+            gains=_numbers(content["gains"], gains, "gains"),
             neutral_rudder=_number(content["neutral_rudder"], rudder, "neutral_rudder"),
             neutral_sway=_number(content["neutral_sway"], ANY_NUMBER, "neutral_sway"),
             margins=_margins(content["margins"]),
             observation_scales=read_scales(content["observation_scales"], names),
-            design=_design(content["design"], design),
+            design=_numbers(content["design"], needed, "design"),
             observation_names=names,
             **read_model(content["model"]),
             **_arrays(content.get("arrays", {}), design.arrays),
@@ -86,48 +98,6 @@ def _class_of(content: Mapping[str, Any], where: str) -> type[Controller]:
             f" got '{kind}'"
         )
     return controller_class(kind)
-
-
-def _further_fields(design: type[Controller]) -> list[str]:
-    """Fields that a kind of controller has in addition to `FIELDS`."""
-    fields_of_kind = {
-        "arrays": bool(design.arrays),
-        "autopilot": design.has_autopilot,
-        "ship": design.has_ship,
-    }
-    return [name for name, present in fields_of_kind.items() if present]
-
-
-def _names(value: Any, where: str) -> tuple[str, ...]:
-    if not isinstance(value, list):
-        raise InputError(
-            f"{where}: observation_names: expected a list of names, got {shown(value)}"
-        )
-    names = [str(name) for name in value]
-    return tuple(names)
-
-
-def _gains(value: Any, design: type[Controller]) -> dict[str, float]:
-    bounds = {}
-    for name in _gain_names(design):
-        bounds[name] = design.bounds.get(name, ANY_NUMBER)
-    table = check_table(value, "gains", bounds)
-    return _numbers(table, bounds, "gains")
-
-
-def _design(value: Any, design: type[Controller]) -> dict[str, float]:
-    """Design settings: any numbers, those that the law needs within their bounds."""
-    table = check_table(value, "design")
-    gains = _gain_names(design)
-    needed = {}
-    for name, bounds in design.bounds.items():
-        if name not in gains:
-            needed[name] = bounds
-    return _numbers(table, needed, "design")
-
-
-def _gain_names(design: type[Controller]) -> tuple[str, ...]:
-    return design.gain_names or tuple(design.feedback)
 
 
 def _parts(content: Mapping[str, Any], design: type[Controller]) -> dict[str, Any]:
@@ -151,47 +121,24 @@ def _parts(content: Mapping[str, Any], design: type[Controller]) -> dict[str, An
 def _arrays(value: Any, axes_of: Mapping[str, tuple[str | int, ...]]) -> dict[str, Any]:
     """Arrays of numbers, whose axes of one name have one length."""
     table = check_table(value, "arrays", axes_of, axes_of)
-    lengths: dict[str, int] = {}  # of named axes
+    lengths: dict[Any, int] = {}  # of named axes
     arrays = {}
     for name, axes in axes_of.items():
         where = f"arrays.{name}"
-        array = check_array(table[name], _shape(axes, lengths), where)
-        if not _has_axes(array, axes, lengths) or not _is_bounded(array):
-            largest = ANY_NUMBER.largest
+        shape = [axis if isinstance(axis, int) else lengths.get(axis) for axis in axes]
+        array = check_array(table[name], tuple(shape), where)
+        fits = array.ndim == len(axes) and array.size > 0
+        if fits:
+            sizes = zip(axes, array.shape, strict=True)
+            fits = all(n == lengths.setdefault(axis, n) for axis, n in sizes)
+        if not fits or np.abs(array).max() > ANY_NUMBER.largest:
             expected = ", ".join(map(str, axes))
             raise InputError(
-                f"{where}: expected numbers of magnitude {largest:g} at most, of shape"
-                f" ({expected}), got shape {array.shape}; {REMEDY}"
+                f"{where}: expected numbers of magnitude {ANY_NUMBER.largest:g} at"
+                f" most, of shape ({expected}), got shape {array.shape}; {REMEDY}"
             )
         arrays[name] = array
     return arrays
-
-
-def _shape(
-    axes: tuple[str | int, ...], lengths: Mapping[str, int]
-) -> tuple[int | None, ...]:
-    """Lengths of axes; None for a named one whose length is not known yet."""
-    shape = []
-    for axis in axes:
-        length = lengths.get(axis) if isinstance(axis, str) else axis
-        shape.append(length)
-    return tuple(shape)
-
-
-def _has_axes(
-    array: Floats, axes: tuple[str | int, ...], lengths: dict[str, int]
-) -> bool:
-    """Compare an array's axes with those expected; keep lengths of named ones."""
-    if array.ndim != len(axes) or array.size == 0:
-        return False
-    for axis, length in zip(axes, array.shape, strict=True):
-        if isinstance(axis, str) and lengths.setdefault(axis, length) != length:
-            return False
-    return True
-
-
-def _is_bounded(array: Floats) -> bool:
-    return bool(np.abs(array).max() <= ANY_NUMBER.largest)
 
 
 def read_model(value: Any) -> dict[str, str]:
@@ -227,10 +174,9 @@ def _number(value: Any, bounds: Bounds, where: str) -> float:
     return check_number(value, where, at_least=bounds.least, at_most=bounds.largest)
 
 
-def _numbers(
-    table: Mapping[str, Any], needed: Mapping[str, Bounds], where: str
-) -> dict[str, float]:
+def _numbers(value: Any, needed: Mapping[str, Bounds], where: str) -> dict[str, float]:
     """Numbers by name; InputError names one that is needed and missing."""
+    table = check_table(value, where)
     for name in needed:
         if name not in table:
             raise InputError(

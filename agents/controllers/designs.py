@@ -6,10 +6,8 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
-from agents.agent_file import load_agent
 from agents.controllers.controller import Controller
 from agents.controllers.interface import model_hash
-from agents.controllers.registry import CLASSICAL as CLASSICAL
 from agents.controllers.registry import controller_class
 from agents.suites.suite import BenchmarkTask, load_tuned
 from shipgym import InputError, ShipModel
@@ -134,8 +132,8 @@ def bandwidth_settings(design: Mapping[str, float], share: float) -> dict[str, f
 def tuned(kind: str, task: BenchmarkTask, suite: str) -> Controller:
     """Design a classical controller with the settings found for a task of a suite.
 
-    `kind`: of `CLASSICAL`; "best" is that which cost least, "base" likewise without
-    `NO_BASES`. Raises InputError if there are no such settings.
+    `kind`: of `registry.CLASSICAL`; "best" is that which cost least, "base" likewise
+    without `NO_BASES`. Raises InputError if there are no such settings.
     """
     found = load_tuned(suite).get(task.name, {})
     if kind == "best":
@@ -168,36 +166,3 @@ def no_path(kind: str, task: BenchmarkTask) -> InputError:
     return InputError(
         f"controller: expected a path for '{kind}', got none in '{where}'"
     )
-
-
-def design_base(name: str, task: BenchmarkTask) -> Controller | None:
-    """Controller that a policy adds to, by the setting `base`.
-
-    Raises InputError if the ship has no such controller, the file is not one for her,
-    or guidance has no path to follow.
-
-    Parameters
-    ----------
-    name : str
-        "none"; a kind of controller, which is designed on the task's ship; "tuned", the
-        best of those that were tuned for the task of a suite, without `NO_BASES`; or a
-        controller's file.
-    task : BenchmarkTask
-    """
-    if name == "none":
-        return None
-    if name == "tuned":
-        if not task.suite:
-            raise InputError(
-                "base: expected a task of a suite for 'tuned', got none; give --task,"
-                " or another base"
-            )
-        return tuned("base", task, task.suite)
-    if name.endswith(".json"):
-        agent = load_agent(name, task.ship)
-        if not isinstance(agent, Controller):
-            raise InputError(
-                f"base: {name}: expected a classical controller, got a learned policy"
-            )
-        return agent
-    return design(name, task)

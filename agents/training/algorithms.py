@@ -10,8 +10,11 @@ from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.noise import NormalActionNoise
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
+from agents.agent_file import load_agent
 from agents.controllers.controller import Controller
+from agents.controllers.designs import design, tuned
 from agents.policies.policy import NO_LIMIT
+from agents.suites.suite import BenchmarkTask
 from agents.training.plan import TrainingPlan, training_options
 from agents.training.residual import ResidualVecEnv
 from agents.training.settings import (
@@ -23,6 +26,7 @@ from agents.training.settings import (
     TQCSettings,
 )
 from shipgym.envs.sb3 import ShipVecEnv
+from shipgym.errors import InputError
 from shipgym.extras import library
 
 
@@ -100,6 +104,39 @@ def make_agent(plan: TrainingPlan, base: Controller | None) -> Any:
     if base is not None and isinstance(settings, OffPolicySettings):
         begin_as_base(agent)
     return agent
+
+
+def design_base(name: str, task: BenchmarkTask) -> Controller | None:
+    """Controller that a policy adds to, by the setting `base`.
+
+    Raises InputError if the ship has no such controller, the file is not one for her,
+    or guidance has no path to follow.
+
+    Parameters
+    ----------
+    name : str
+        "none"; a kind of controller, which is designed on the task's ship; "tuned", the
+        best of those that were tuned for the task of a suite, without `NO_BASES`; or a
+        controller's file.
+    task : BenchmarkTask
+    """
+    if name == "none":
+        return None
+    if name == "tuned":
+        if not task.suite:
+            raise InputError(
+                "base: expected a task of a suite for 'tuned', got none; give --task,"
+                " or another base"
+            )
+        return tuned("base", task, task.suite)
+    if name.endswith(".json"):
+        agent = load_agent(name, task.ship)
+        if not isinstance(agent, Controller):
+            raise InputError(
+                f"base: {name}: expected a classical controller, got a learned policy"
+            )
+        return agent
+    return design(name, task)
 
 
 def begin_as_base(agent: Any) -> None:

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from agents.agent_file import load_agent
-from agents.controllers.designs import design_base
 from agents.output import in_use
 from agents.policies.policy import LearnedPolicy
 from agents.training import run_folder
@@ -38,7 +37,11 @@ from stable_baselines3.common.logger import (  # noqa: E402
 from stable_baselines3.common.save_util import recursive_getattr  # noqa: E402
 from stable_baselines3.common.utils import set_random_seed  # noqa: E402
 
-from agents.training.algorithms import make_agent, set_deviation  # noqa: E402
+from agents.training.algorithms import (  # noqa: E402
+    design_base,
+    make_agent,
+    set_deviation,
+)
 
 LARGEST_CHECKPOINT = 2_000_000_000  # bytes
 #: Arrays of a replay buffer.

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from agents import PID
-from agents.controllers.designs import CLASSICAL, design, design_base, tuned
+from agents.controllers.designs import design, tuned
+from agents.controllers.registry import CLASSICAL
 from agents.suites.suite import BenchmarkTask, load_suite, load_tuned
+from agents.training.algorithms import design_base
 from agents.training.controller_search import (
     SearchBudget,
     episodes_of,

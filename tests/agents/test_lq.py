@@ -33,7 +33,7 @@ def linear_cost(ship, gain, cost, n=4000):
         x = ship.A @ x - ship.B[:, 0] * (gain @ x)
         rate = (x[3] - before) / ship.dt
         total += x[2] ** 2 + cost.rudder_weight * x[3] ** 2
-        total += cost.rate_weight_s2 * rate**2 + (x[4] / cost.integral_time) ** 2
+        total += cost.rate_weight_s2 * rate**2 + (x[4] / (20.0 * LENGTH_TIME)) ** 2
     return total
 
 

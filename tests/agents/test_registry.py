@@ -14,9 +14,9 @@ from agents import LQ, benchmark, check_controller, load_agent, register_control
 from agents.cli import app
 from agents.controllers import registry
 from agents.controllers.controller import Controller
-from agents.controllers.designs import design_base
 from agents.controllers.law import Nothing, linear_law
 from agents.suites.suite import find_task
+from agents.training.algorithms import design_base
 from shipgym import load_model
 from shipgym.errors import InputError
 from tests.agents.policies import random_policy
