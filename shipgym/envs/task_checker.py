@@ -18,7 +18,6 @@ from shipgym.errors import InputError
 from shipgym.findings import Findings
 from shipgym.models import ShipModel
 from shipgym.python_files import asked, place_of
-from shipgym.sea.current_field import function_of_file
 from shipgym.tasks.task import Task
 
 STEPS = 400
@@ -184,7 +183,7 @@ def _source_of(name: str, task: Task) -> str:
     """File that a number comes from, for messages."""
     definition = task.definition
     if name.startswith("current"):
-        return place_of(function_of_file(task.current))
+        return place_of(task.current)
     if name.startswith("reward_"):
         return definition.reward_source
     if task.sensors is None or not name.startswith("Observation."):

@@ -14,7 +14,6 @@ from shipgym.engine.records import leaves
 from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.sea.conditions import Weather, as_weather
-from shipgym.sea.current_field import CurrentField
 from shipgym.sea.open_sea import OPEN_SEA, Sea
 from shipgym.sea.weather_column import weather_column
 from shipgym.ships.manoeuvring_model import (
@@ -57,11 +56,6 @@ class Passage:
         self.dt = dt
         self.numbers = model.ship_numbers(conditions.water_depth, dt)
         weather = as_weather(conditions.weather, "weather")
-        if isinstance(weather.current, CurrentField):
-            raise InputError(
-                "weather: expected a current that is the same everywhere, got one by"
-                f" place, {weather.current.file}, which only environments know"
-            )
         self.windy = not weather.calm
         self.sea = np.zeros(0), np.zeros(0, dtype=np.uint64), np.zeros(0)
         if self.windy:

@@ -4,7 +4,6 @@ from .conditions import Waves as Waves
 from .conditions import Weather as Weather
 from .conditions import Wind as Wind
 from .conditions import sea_states as sea_states
-from .current_field import CurrentField as CurrentField
 from .drift import WaveDrift as WaveDrift
 from .drift import wave_drift as wave_drift
 from .estimates import weather_particulars as weather_particulars

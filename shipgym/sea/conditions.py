@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, fields
-from pathlib import Path
 from typing import Any, Literal
 
 from shipgym.checks import (
@@ -19,7 +18,6 @@ from shipgym.checks import (
 )
 from shipgym.constants import GRAVITY
 from shipgym.errors import InputError
-from shipgym.sea.current_field import CurrentField
 from shipgym.sea.wind_coefficients import WindTable, check_coefficients
 
 
@@ -235,13 +233,10 @@ def find_sea_state(name: str | int) -> SeaState:
 class Weather:
     """Current, wind and waves, each optional, and a name for reports.
 
-    The current is the same everywhere (`Current`) or differs from place to place
-    (`CurrentField`).
-
     Raises InputError for parts that are not of these types.
     """
 
-    current: Current | CurrentField | None = None
+    current: Current | None = None
     wind: Wind | None = None
     waves: Waves | None = None
     name: str = "weather"
@@ -252,8 +247,6 @@ class Weather:
             part = getattr(self, name)
             kind = PARTS[name]
             if isinstance(part, kind) or part is None:
-                continue
-            if name == "current" and isinstance(part, CurrentField):
                 continue
             raise InputError(
                 f"weather {name}: expected shipgym.{kind.__name__}(...) or None, got"
@@ -338,8 +331,6 @@ def as_weather(
 ) -> Weather:
     """Return a weather, that of a sea state by name, or calm for None.
 
-    The path of a Python file stands for its current (`CurrentField`).
-
     InputError, beginning with `where`, for anything else.
     """
     if weather is None:
@@ -351,8 +342,6 @@ def as_weather(
             f"{where}: expected a Weather of shipgym.sea or the name of a sea state,"
             f" got {weather!r}"
         )
-    if weather.endswith(".py"):
-        return Weather(current=CurrentField(weather), name=Path(weather).stem)
     try:
         return Weather.from_sea_state(weather, from_deg)
     except InputError as error:

@@ -58,7 +58,7 @@ def weather_column(
     """
     sea = CALM
     current = weather.current
-    if isinstance(current, Current) and not current.calm:
+    if current is not None and not current.calm:
         sea = with_current(sea, current, step)
     wind = weather.wind
     if wind is not None and not wind.calm:

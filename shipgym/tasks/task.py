@@ -237,24 +237,10 @@ class Task:
         """Weather of the task, the first of several."""
         return self.seas[0]
 
-    @cached_property
+    @property
     def current(self) -> Any:
-        """Current that differs from place to place, a function, or None.
-
-        It is the task's or that of all seas; InputError for several.
-        """
-        found = {self.definition.current} - {None}
-        for sea in self.seas:
-            found.add(getattr(sea.current, "function", None))
-        found_by_sea = found - {self.definition.current}
-        if found_by_sea == {None}:
-            return self.definition.current
-        if len(found) > 1:
-            raise InputError(
-                "sea: expected one current by place in all episodes, the task's or"
-                " that of every sea, got several"
-            )
-        return found.pop()
+        """The task's current that differs from place to place, a function, or None."""
+        return self.definition.current
 
     def interval(self, model: ShipModel) -> float:
         """Control interval for a ship, s."""
