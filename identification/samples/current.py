@@ -43,8 +43,6 @@ class CurrentEstimate(NamedTuple):
 
     mean: Floats  # m/s, shape (2 n_trials,); the same pair repeated where shared
     covariance: Floats  # (m/s)^2, shape (2 n_trials, 2 n_trials)
-    #: of the equations of surge and sway, in deviations of the prior, shape (18,)
-    coefficients: Floats
 
 
 def estimate_current(
@@ -52,7 +50,6 @@ def estimate_current(
     length: float,
     speed: float,
     shared: bool,
-    known: Floats | None = None,
 ) -> CurrentEstimate:
     """Estimate the current of each trial, or of all, from velocities over ground.
 
@@ -67,11 +64,9 @@ def estimate_current(
         Of the ship, m and m/s.
     shared : bool
         Whether the trials have one current.
-    known : array of shape (18,), optional
-        Coefficients of another estimate, which are then not fitted.
     """
     runs = trials_on_one_grid(trials, length, speed)
-    problem = _Problem(runs, shared, known)
+    problem = _Problem(runs, shared)
     fit = problem.fitted()
     n_parts = 1 if shared and len(trials) > 2 else 3
     covariance = _covariance(problem, fit, n_parts)
@@ -80,7 +75,6 @@ def estimate_current(
     return CurrentEstimate(
         mean=speed * fit.x[columns],
         covariance=speed**2 * covariance[np.ix_(columns, columns)],
-        coefficients=fit.x[:N_COEFFICIENTS],
     )
 
 
@@ -140,7 +134,7 @@ class _Problem:
     of each trial, then the current of each trial or of all.
     """
 
-    def __init__(self, runs: Runs, shared: bool, known: Floats | None) -> None:
+    def __init__(self, runs: Runs, shared: bool) -> None:
         self.runs = runs
         n_trials = runs.n_trials
         n_currents = 1 if shared else n_trials
@@ -155,10 +149,6 @@ class _Problem:
         of_starts = np.tile([0.3, 0.15], n_trials)  # u and v
         of_currents = np.full(2 * n_currents, 0.5)
         deviations = np.concatenate([of_coefficients, of_starts, of_currents])
-        self.centre = np.zeros(len(deviations))
-        if known is not None:
-            deviations[:N_COEFFICIENTS] = 1e-4
-            self.centre[:N_COEFFICIENTS] = known
         self.weights = 1.0 / deviations
 
     def simulated(self, x: Floats) -> Floats:
@@ -221,7 +211,7 @@ class _Problem:
         by_start = by_unknown[..., N_COEFFICIENTS:]
 
         *shape, _ = lanes.shape
-        n_unknowns = len(self.centre)
+        n_unknowns = len(self.weights)
         slopes = np.zeros((*shape, n_unknowns))
         slopes[..., :N_COEFFICIENTS] = by_coefficient
         for k in range(self.runs.n_trials):
@@ -234,7 +224,7 @@ class _Problem:
 
     def fitted(self, most_rounds: int = 20, enough: float = 1e-3) -> _Fit:
         """Fit by Levenberg & Marquardt; each round renews the residuals' scale."""
-        x = self.centre
+        x = np.zeros(len(self.weights))
         damping = 1e-2
         scale = 0.1
         errors, slopes = self.errors(x)
@@ -269,7 +259,7 @@ class _Problem:
         """Standard deviation of the errors, at least that of the sensors' rounding."""
         is_measured = np.isfinite(self.runs.seen)
         n_measured = int(is_measured.sum())
-        freedom = max(n_measured - len(self.centre), 1)
+        freedom = max(n_measured - len(self.weights), 1)
         variance = np.sum(errors**2) / freedom
         rounding = 0.003
         return max(float(np.sqrt(variance)), rounding)
@@ -283,7 +273,7 @@ class _Problem:
     ) -> Floats:
         """Damped step of Gauss & Newton from x."""
         J = slopes.reshape(-1, len(x))
-        from_prior = self.weights**2 * (x - self.centre)
+        from_prior = self.weights**2 * x
         downhill = J.T @ residuals.ravel() - from_prior
         hessian = self.information(slopes)
         diagonal = np.diag(np.diag(hessian))
@@ -297,7 +287,7 @@ class _Problem:
         return J.T @ J + of_prior
 
     def _cost(self, x: Floats, residuals: Floats) -> float:
-        from_prior = self.weights * (x - self.centre)
+        from_prior = self.weights * x
         misfit = np.sum(residuals**2)
         return float(misfit + np.sum(from_prior**2))
 

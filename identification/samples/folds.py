@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,13 +13,6 @@ from shipgym.checks import check_choice
 TRIALS = "trials"
 LARGEST_RUDDER = "largest-rudder"
 FOLDS = (TRIALS, LARGEST_RUDDER)
-
-
-class Fold(NamedTuple):
-    """A regression divided into samples to fit and samples held out."""
-
-    fit: Samples
-    held: Samples
 
 
 def of_largest_rudder(trials: Sequence[Trial], where: str) -> Flags:
@@ -67,40 +59,6 @@ def held_out_rows(
             before = end <= piece.t[0]
             after = samples.start >= piece.t[-1]
             yield before | after, piece
-
-
-def sample_folds(trials: Sequence[Trial], samples: Samples, folds: str) -> list[Fold]:
-    """Samples to fit and samples held out; of a single trial each fifth of its samples.
-
-    `folds`: one of `FOLDS`; by the largest rudder each trial that has it is held out of
-    a fit to all that have less.
-    """
-    if folds == LARGEST_RUDDER:
-        largest = of_largest_rudder(trials, "prior_folds")
-        smaller = samples.select(~largest[samples.trial])
-        found = []
-        for index in np.flatnonzero(largest):
-            own = samples.trial == index
-            fold = Fold(
-                fit=smaller,
-                held=samples.select(own),
-            )
-            found.append(fold)
-        return found
-
-    groups = samples.trial
-    if groups.max() == groups.min():
-        n_samples = len(samples)
-        groups = np.arange(n_samples) * 5 // n_samples
-    found = []
-    for group in np.unique(groups):
-        own = groups == group
-        fold = Fold(
-            fit=samples.select(~own),
-            held=samples.select(own),
-        )
-        found.append(fold)
-    return found
 
 
 def pieces(trial: Trial) -> list[Trial]:

@@ -158,7 +158,7 @@ def currents_of(
     """Currents by trial, of those whose current is known or can be estimated.
 
     The trials to fit have one current unless they contradict it. That of a trial held
-    out is theirs, or is found by their coefficients. A current is estimated from trials
+    out is theirs, or its own. A current is estimated from trials
     of at least five ship lengths.
 
     Parameters
@@ -211,13 +211,7 @@ def _estimated_currents(
         if not shared and trial.use == "fit":
             place = fitted.index(trial)
         elif not shared:
-            own = estimate_current(
-                [trial],
-                length=length,
-                speed=speed,
-                shared=True,
-                known=estimate.coefficients,
-            )
+            own = estimate_current([trial], length=length, speed=speed, shared=True)
         pair = slice(2 * place, 2 * place + 2)
         found[trial.name] = TrialCurrent(
             velocity=own.mean[pair],

@@ -10,19 +10,13 @@ from scipy.ndimage import median_filter
 from identification.samples.preprocess.noise import noise_level
 from shipgym import InputError, Trial
 from shipgym.arrays import Flags, Floats
-from shipgym.checks import check_number
 from shipgym.trials.resampling import usual_step
 
 WIDTH = 7  # samples of the running median
 OUTLYING = 6.0  # times the noise
 
 
-def outliers(
-    t: ArrayLike,
-    values: ArrayLike,
-    threshold: float = OUTLYING,
-    may_step: bool = True,
-) -> Flags:
+def outliers(t: ArrayLike, values: ArrayLike, may_step: bool = True) -> Flags:
     """Flags of samples away from the running median by several times the noise.
 
     Source: Hampel 1974, JASA 69. What the signal itself moves from sample to sample is
@@ -33,8 +27,6 @@ def outliers(
     ----------
     t, values : array-like of shape (n_samples,)
         Times, s, and the channel.
-    threshold : float
-        In standard deviations of the noise.
     may_step : bool
         Whether the signal may have just moved at its ends, as a rudder does; if not,
         the first and the last sample are compared with the next one.
@@ -46,7 +38,7 @@ def outliers(
 
     middle = median_filter(values, WIDTH, mode="nearest")
     rounding = 1e-9 * np.ptp(middle)
-    least = threshold * noise_level(t, values) + rounding
+    least = OUTLYING * noise_level(t, values) + rounding
     allowed = least + 0.5 * WIDTH * _usual_steps(middle)
     deviations = np.abs(values - middle)
     found: Flags = deviations > allowed
@@ -91,7 +83,7 @@ def _ends_that_jump(
     return is_jump(0), is_jump(-1)
 
 
-def repaired(trial: Trial, threshold: float = OUTLYING) -> Trial:
+def repaired(trial: Trial) -> Trial:
     """Replace outliers and fill short dropouts of a trial by PCHIP interpolation.
 
     A dropout is a step in time of more than 1.5 usual ones; those of up to 10 are
@@ -100,13 +92,11 @@ def repaired(trial: Trial, threshold: float = OUTLYING) -> Trial:
     the number of values that were filled by channel, and `raw`, the trial as it was.
     Raises InputError where more than a tenth of a channel would be outliers.
     """
-    hint = "in standard deviations of the noise"
-    check_number(threshold, "threshold", above=0.0, hint=hint)
     times = _filled_times(trial.t)
     is_recorded = np.isin(times, trial.t)
     channels, counts = {}, {}
     for name, values in trial.channels.items():
-        wrong = _outliers_of(trial, name, threshold)
+        wrong = _outliers_of(trial, name)
         sound = is_recorded.copy()
         sound[is_recorded] = ~wrong
         channels[name] = values
@@ -130,24 +120,18 @@ def _interpolated(times: Floats, known: Floats, values: Floats) -> Floats:
     return np.asarray(curve(within))
 
 
-def _outliers_of(trial: Trial, name: str, threshold: float) -> Flags:
+def _outliers_of(trial: Trial, name: str) -> Flags:
     """Outliers of a channel; of one that is not measured none."""
     measured = ("x", "y", "psi", "u", "v", "r", "p", "phi", "delta", "n")
     if name not in measured:
         return np.zeros(len(trial), dtype=bool)
     stepping = ("delta", "n")  # without the inertia of a ship
-    may_step = name in stepping
-    wrong = outliers(
-        trial.t,
-        values=trial[name],
-        threshold=threshold,
-        may_step=may_step,
-    )
+    wrong = outliers(trial.t, trial[name], may_step=name in stepping)
     if wrong.mean() > 0.1:
         raise InputError(
             f"trial {trial.name!r}: expected at most a tenth of {name} to be outliers,"
-            f" got {wrong.sum()} of {len(trial)} samples; check the channel, or give a"
-            f" threshold above {threshold:g}"
+            f" got {wrong.sum()} of {len(trial)} samples; check the channel, or"
+            " leave the trial as it is (repair = false)"
         )
     return wrong
 
