@@ -19,7 +19,6 @@ from typer.testing import CliRunner
 from agents.cli import app, main, reproduction
 from agents.cli.command import CommandGroup, shared_options
 from agents.jobs import JobError
-from agents.training.run_folder import CHECKPOINT
 from shipgym import InputError, ManoeuvreError, UnstableModelError, load_model
 
 ROOT = Path(__file__).parents[2]
@@ -93,28 +92,6 @@ def test_every_command_has_json_and_quiet_and_an_example_that_it_takes(name):
 
 
 @pytest.mark.parametrize(
-    "words",
-    [
-        ["look", "SHIP", "--out", "OUT/look.html"],
-        ["new-ship", "SHIP/../zigzag_10_10.csv", "--out", "OUT/new.toml"],
-        ["trials", "mariner", "--draws", "0"],
-        ["export", "mariner", "--c", "OUT/mariner"],
-    ],
-)
-def test_json_is_all_that_is_printed_and_with_quiet_nothing(words, demo, tmp_path):
-    for flags in (["--json", "--quiet"], ["--quiet"]):
-        out = tmp_path / str(len(flags))
-        out.mkdir()
-        places = {"SHIP/..": demo.parent, "SHIP": demo, "OUT": out}
-        given = words
-        for place, path in places.items():
-            given = [word.replace(place, str(path)) for word in given]
-        answer = shipgym(*given, *flags)
-        assert (answer.exit_code, answer.stderr) == (0, "")
-        assert json.loads(answer.stdout) if "--json" in flags else answer.stdout == ""
-
-
-@pytest.mark.parametrize(
     ("typed", "completed"),
     [("shipgym auto", "autopilot"), ("shipgym identify --struct", "--structure")],
 )
@@ -133,17 +110,6 @@ def test_a_shell_completes_commands_and_the_options_of_identify(typed, completed
         check=False,
     )
     assert completed in answer.stdout.split(), answer.stderr
-
-
-def test_help_imports_nothing_heavy():
-    code = (
-        "import sys, agents.cli; sys.exit(any(m in sys.modules for m in ('numpy',"
-        " 'scipy', 'numba', 'rich')))"
-    )
-    assert (
-        subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode
-        == 0
-    )
 
 
 @pytest.mark.parametrize(
@@ -203,14 +169,6 @@ def test_a_wrong_ship_file_exits_with_2_one_message_and_nothing_written(
     assert said in answer.stderr
     assert answer.stdout == ""
     assert not (ship.parent / "out").exists()
-
-
-def test_a_wrong_sample_is_told_with_file_line_and_column(broken):
-    ship = broken("\n20.0,", "\n20.0,north", "zigzag_20_20.csv")
-    answer = shipgym("identify", ship, "--out", ship.parent / "out")
-    assert answer.exit_code == 2
-    assert "zigzag_20_20.csv" in answer.stderr
-    assert "gnss_north_m" in answer.stderr
 
 
 def test_a_folder_with_other_files_is_refused_before_any_work(demo, tmp_path):
@@ -281,64 +239,6 @@ def test_what_trials_cannot_use_exits_with_2(words, message, tmp_path, monkeypat
     answer = shipgym("trials", *words)
     assert answer.exit_code == 2
     assert message in answer.stderr
-
-
-def test_trials_in_shallow_water():
-    answer = shipgym("trials", "tanker", "--depth", 25, "--json")
-    found = json.loads(answer.stdout)
-    assert found["water_depth"] == 25.0
-    assert found["imo"] == {}  # the criteria are made for deep water
-    turn = found["manoeuvres"]["turning circle 35 deg to starboard"]
-    assert turn["tactical_diameter_lengths"]["value"] > 3.5
-
-
-@pytest.mark.parametrize(
-    ("name", "message"), [("none", "interrupted"), ("kept", "interrupted; continue")]
-)
-def test_an_interrupted_training_says_whether_it_can_go_on(
-    name, message, tmp_path, monkeypatch
-):
-    def interrupted(plan, out, **settings):
-        assert settings["command"] == "shipgym train ppo --out 'my run'"
-        if out.name == "kept":
-            out.mkdir()
-            (out / CHECKPOINT).touch()
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("agents.training.training.train", interrupted)
-    monkeypatch.setattr(
-        sys, "argv", ["/bin/shipgym", "train", "ppo", "--out", "my run"]
-    )
-    answer = shipgym("train", "ppo", "--out", tmp_path / name)
-    assert answer.exit_code == 130
-    assert answer.stderr.startswith(f"error: {message}")
-    assert ("--resume --out" in answer.stderr) == (name == "kept")
-
-
-def test_options_of_a_training_reach_its_plan(tmp_path, monkeypatch):
-    plans = []
-
-    def stop(plan, out, **settings):
-        plans.append((plan, settings["max_seconds"]))
-        raise InputError("stopped")
-
-    monkeypatch.setattr("agents.training.training.train", stop)
-    options = """--env path-following --model tanker --sea rough
-        --option max_turn_deg=20 --total-steps 5000 --set gamma=0.9
-        --from-nothing --seed 7 --randomise
-        --threads 2 --max-seconds 9"""
-    answer = shipgym("train", "sac", "--out", tmp_path / "run", *options.split())
-    assert answer.stderr.splitlines()[-1] == "error: stopped"
-    ((plan, seconds),) = plans
-    assert (plan.algorithm, plan.training_seed, plan.threads, seconds) == (
-        "sac",
-        7000,
-        2,
-        9.0,
-    )
-    assert plan.task.model == "tanker"
-    settings = plan.settings.to_dict()
-    assert (settings["gamma"], settings["base"]) == (0.9, "none")
 
 
 def failing_command(error):
@@ -456,36 +356,6 @@ def test_an_autopilot_that_cannot_be_trusted_fails_with_the_reason(
     answer = shipgym("autopilot", demo, "--out", tmp_path)
     assert answer.exit_code == (1 if fields else 0)
     assert answer.stderr.startswith(message)
-
-
-@pytest.mark.parametrize(
-    ("stable", "error", "code"), [(True, 0.1, 0), (False, 0.1, 1), (True, None, 1)]
-)
-def test_a_comparison_in_which_no_method_stays_stable_fails(
-    stable, error, code, demo, tmp_path, monkeypatch
-):
-    found = SimpleNamespace(
-        save=lambda folder: (folder / "comparison.json").write_text("{}"),
-        to_dict=lambda: {"held_out": "trials marked validate", "ranking": []},
-        refused={"svr": "too few"},
-        left_out={"ls": ("C", "rank")},
-        ranked=[SimpleNamespace(stable=stable, error=error)],
-    )
-    monkeypatch.setattr("agents.identifying.compare_ship", lambda *_: found)
-    answer = shipgym("identify", demo, "--out", tmp_path / "out", "--compare")
-    assert answer.exit_code == code
-    assert answer.stderr.splitlines() == [
-        "warning: svr was not fitted: too few",
-        (
-            "warning: ls has no setting of these names and was fitted without them: C,"
-            " rank"
-        ),
-        *(
-            ["error: no method gives a model that stays stable on every held-out trial"]
-            if code
-            else []
-        ),
-    ]
 
 
 def test_papers_are_reproduced_by_the_program_of_the_checkout(monkeypatch, tmp_path):

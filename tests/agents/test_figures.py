@@ -1,7 +1,5 @@
 """Figures of the pages draw the numbers that they are given."""
 
-from types import SimpleNamespace
-
 import numpy as np
 
 from agents.verification import figures
@@ -41,24 +39,6 @@ def test_criteria_are_drawn_in_per_cent_of_their_limits():
     ]
 
 
-def test_tracks_are_drawn_in_ship_lengths_and_their_errors_along_the_path():
-    kept = SimpleNamespace(
-        waypoints=np.array([[0.0, 0.0], [300.0, 400.0]]),
-        positions=np.array([[0.0, 10.0], [30.0, 50.0], [60.0, 90.0]]),
-        cross_track=np.array([1.0, 2.0, 3.0]),
-    )
-    figure = figures.tracks_figure({"wheel-over": kept, "ilos": kept}, 100.0)
-    planned = only(figure, "waypoints")
-    np.testing.assert_allclose((planned.x, planned.y), ([0.0, 4.0], [0.0, 3.0]))
-    track, error = traces(figure, "ilos")
-    np.testing.assert_allclose(
-        (track.x, track.y), ([0.1, 0.5, 0.9], [0.0, 0.3, 0.6]), rtol=1e-6
-    )
-    np.testing.assert_allclose(
-        (error.x, error.y), ([0.0, 0.5, 1.0], [1.0, 2.0, 3.0]), rtol=1e-6
-    )
-
-
 def test_manoeuvres_are_drawn_in_degrees_and_ship_lengths():
     t = np.arange(4.0)
     zigzag = Trial(t, {"psi": np.radians(t), "delta": np.radians(-2.0 * t)})
@@ -82,24 +62,3 @@ def test_manoeuvres_are_drawn_in_degrees_and_ship_lengths():
     np.testing.assert_allclose(
         band.y, [19.5, 20.5, 21.5, 22.5, 3.5, 2.5, 1.5, 0.5], rtol=1e-6
     )
-
-
-def test_steps_are_those_of_each_autopilot():
-    t = np.arange(3.0)
-    heading = np.radians([[0.0, 10.0, 20.0], [0.0, 12.0, 22.0], [0.0, 8.0, 18.0]])
-    figure = figures.steps_figure(
-        t, {"pid": (heading, -heading), "lq": (heading[:1], heading[:1])}, 20.0
-    )
-    above, below = [trace for trace in traces(figure, "pid") if trace.fill is None]
-    np.testing.assert_allclose(above.y, [0.0, 10.0, 20.0], rtol=1e-6)
-    np.testing.assert_allclose(below.y, [0.0, -10.0, -20.0], rtol=1e-6)
-    bands = [
-        trace for trace in traces(figure, "pid") if trace.fill is not None
-    ]  # of the two draws
-    np.testing.assert_allclose(bands[0].y, [0.0, 11.9, 21.9, 18.1, 8.1, 0.0], rtol=1e-6)
-    np.testing.assert_allclose(
-        bands[1].y, [0.0, -8.1, -18.1, -21.9, -11.9, 0.0], rtol=1e-6
-    )
-    assert len(traces(figure, "lq")) == 2
-    course = only(figure, "set course")
-    assert (list(course.x), list(course.y)) == ([0.0, 2.0], [20.0, 20.0])

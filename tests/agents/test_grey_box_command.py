@@ -55,19 +55,6 @@ def test_a_method_and_a_reference_ship_are_enough(ship_file):
     )
 
 
-def test_a_grey_box_takes_the_most_similar_ship_if_none_is_named(ship_file):
-    block = "speed = 7.7175  # 15 knots\nblock_coefficient = 0.60"
-    ship = ship_file(f'structure = "grey-box"\nmethod = "rm-svm"\n{QUICK}')
-    ship.write_text(ship.read_text().replace("speed = 7.7175  # 15 knots", block))
-    answer = identified(ship, "--json")
-    assert answer.exit_code == 0, answer.stderr
-    reference = shipgym.load_model(ship.parent / "out" / "model.json").provenance[
-        "reference"
-    ]
-    assert reference["name"] == "mariner"
-    assert max(reference["similarity"], key=reference["similarity"].get) == "mariner"
-
-
 @pytest.mark.parametrize(
     ("identify", "options", "said"),
     [

@@ -134,16 +134,6 @@ def test_a_reference_model_is_found_from_the_ship_file_s_folder(ship):
     )
 
 
-def test_only_names_of_files_are_found_from_the_ship_file_s_folder(ship):
-    path = ship(
-        'prior = "own/prior.json"',
-        'reference_model = "tanker"',
-    )
-    chosen = identification_settings(ShipFile.load(path), {})
-    assert chosen["prior"] == str(path.parent / "own" / "prior.json")
-    assert (chosen["reference_model"], chosen["structure"]) == ("tanker", "auto")
-
-
 @pytest.mark.parametrize(
     ("lines", "given", "structure", "reference"),
     [
@@ -211,26 +201,6 @@ def test_what_is_wrong_with_trials_is_told_with_the_ship_file(demo):
         assert str(error.value).startswith(f"{ship.path}: ")
 
 
-def test_rm_svm_on_the_command_line_goes_before_the_structure_of_the_ship_file(demo):
-    ship, given = ShipFile.load(demo), {"method": "rm-svm", "reference_model": "tanker"}
-    assert (
-        identification_settings(ship, {**given, "structure": None})["structure"]
-        == "grey-box"
-    )
-    assert (
-        identification_settings(ship, {**given, "structure": "norrbin"})["structure"]
-        == "norrbin"
-    )
-
-
-@pytest.mark.parametrize("text", ["seed", "=3", "sede=3", "seed=three"])
-def test_an_option_written_wrongly_is_named(demo, tmp_path, text):
-    answer = shipgym("identify", demo, "--out", tmp_path / "out", "--set", text)
-    assert answer.exit_code == 2
-    assert "seed" in answer.stderr
-    assert answer.stderr.count("\n") == 1
-
-
 def test_options_of_the_command_line_reach_the_settings(ship, demo, tmp_path):
     held = f"{demo.parent}/zigzag_10_10.csv"
     answer = shipgym(
@@ -264,41 +234,6 @@ def test_options_of_the_command_line_reach_the_settings(ship, demo, tmp_path):
     assert found["samples"]["window"] == 9
     assert found["preprocessing"] == {"smoothing": "rts", "repair": True}
     assert found["hold_out"] == [held]
-
-
-def test_the_whole_chain_takes_the_same_options(demo, tmp_path):
-    held = "zigzag_10_10.csv"
-    answer = shipgym(
-        "autopilot",
-        demo,
-        "--out",
-        tmp_path / "out",
-        "--draws",
-        "3",
-        "--structure",
-        "abkowitz",
-        "--method",
-        "abc-lssvr",
-        "--set",
-        "objective=training",
-        "--hold-out",
-        held,
-        "--set",
-        "seed=3",
-        "--set",
-        "bounds=[1, 1e6]",
-        "--json",
-    )
-    assert answer.exit_code == 0, answer.stderr
-    assert json.loads(answer.stdout)["trials"][held]["use"] == "validate"
-    told = load_model(tmp_path / "out" / "model.json").provenance
-    assert told["method"] == "abc-lssvr"
-    assert told["settings"]["method"]["objective"] == "training"
-    assert max(found["C"] for found in told["search"].values()) <= 1e6
-    refused = shipgym("autopilot", demo, "--out", tmp_path / "no", "--set", "sede=3")
-    assert refused.exit_code == 2
-    assert "Did you mean 'seed'" in refused.stderr
-    assert not (tmp_path / "no").exists()
 
 
 def test_compare_ranks_methods_and_writes_their_models(demo, tmp_path):
@@ -457,14 +392,6 @@ def test_a_wrong_table_of_terms_is_named(ship, line, other, said, tmp_path):
     assert said in answer.stderr
 
 
-def test_compare_names_a_method_that_does_not_exist(demo, tmp_path):
-    answer = shipgym("identify", demo, "--out", tmp_path / "out", "--methods", "ls,lsq")
-    assert answer.exit_code == 2
-    assert "method: " in answer.stderr
-    assert "'lsq'" in answer.stderr
-    assert "all" not in METHODS
-
-
 def test_advise_tells_information_and_what_to_run_next(demo):
     answer = shipgym(
         "advise", demo, "--coefficient", "N_vvv", "--number", "1", "--json"
@@ -528,25 +455,3 @@ def test_every_option_and_method_is_documented():
     page = document_options.PAGE.read_text(encoding="utf-8")
     options = [*ARGUMENTS, *(one for own in stage_settings().values() for one in own)]
     assert [name for name in (*options, *METHODS) if f"{name}`" not in page] == []
-
-
-def test_a_current_that_is_known_is_given_as_its_help_shows(demo, tmp_path):
-    where, known = tmp_path / "identified", "{ north = 0.2, east = -0.1 }"
-    result = shipgym(
-        "identify", demo, "--structure", "nomoto", "--out", where, "--current", known
-    )
-    assert result.exit_code == 0, result.output
-    settings = json.loads((where / "settings.json").read_text())
-    assert settings["current"] == {"north": 0.2, "east": -0.1}
-    result = shipgym(
-        "identify",
-        demo,
-        "--out",
-        tmp_path / "not",
-        "--current",
-        "{ nort = 0.2, east = 1 }",
-    )
-    assert result.exit_code == 2
-    assert "current: " in result.output
-    assert "'nort'" in result.output
-    assert not (tmp_path / "not").exists()

@@ -1,6 +1,6 @@
 """Monte Carlo gives the same in this process, in others, resumed, and draw by draw."""
 
-from dataclasses import fields, replace
+from dataclasses import fields
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,13 +11,12 @@ from agents.jobs import JobEngine
 from agents.verification.index_uncertainty import (
     NominalRuns,
     SailedDraws,
-    joined,
     nominal_runs,
     sail_draws,
     uncertainty_of,
     with_paths,
 )
-from agents.verification.monte_carlo import draw_jobs, monte_carlo
+from agents.verification.monte_carlo import monte_carlo
 from shipgym import InputError, load_model
 
 DRAWS, SEED = 28, 3  # two jobs
@@ -105,37 +104,6 @@ def test_wrong_arguments(ship, pilots):
         JobEngine("lokal")
 
 
-def test_draws_are_shared_out_in_jobs_of_25_that_go_on_with_the_seeds(ship):
-    drawn = ship.sample(51, 0)
-    jobs = draw_jobs([], ship, drawn, 7)
-    assert [len(job["names"]) for job in jobs] == [25, 25, 1]
-    assert [job["first_seed"] for job in jobs] == [7, 32, 57]
-    assert [name for job in jobs for name in job["names"]] == [
-        draw.name for draw in drawn
-    ]
-    rows = [row for job in jobs for row in job["coefficients"]]
-    assert rows == [list(draw.coefficients.values()) for draw in drawn]
-
-
-def test_runs_are_kept_for_25_and_30_lengths_and_the_circle_within_the_rudder_s_limit(
-    ship,
-):
-    narrow = replace(ship, steering=replace(ship.steering, rudder_limit_deg=25.0))
-    time = ship.particulars["length"] / ship.particulars["speed"]
-    for model, rudder in ((ship, 35.0), (narrow, 25.0)):
-        zigzag, circle = nominal_runs(model)
-        assert np.degrees(np.abs(circle["delta"]).max()) == pytest.approx(
-            rudder, abs=1e-6
-        )
-        assert np.degrees(np.abs(zigzag["delta"]).max()) == pytest.approx(
-            20.0, abs=1e-6
-        )
-        assert (zigzag.t[-1] / time, circle.t[-1] / time) == pytest.approx(
-            (25.0, 30.0), abs=0.11
-        )
-        assert np.diff(circle.t) == pytest.approx(0.1 * time)
-
-
 def sailed(count, lost=()):
     """Draws, some without runs that are kept; headings and paths by their number."""
     numbers = [np.full((3, 2), float(k)) for k in range(count) if k not in lost]
@@ -163,17 +131,3 @@ def test_draws_that_run_away_in_any_manoeuvre_count_once_and_have_no_paths(ship)
     numbers = [path[0, 0] for path in found.circle_paths]
     assert numbers == found.zigzag_headings[:, 0, 0].tolist() == [0, 2, 3, 5, 6]
     assert (found.zigzag, found.circle) == ("zigzag", "circle")
-
-
-def test_parts_are_joined_in_their_order():
-    whole = joined([sailed(3, [1]), sailed(2)])
-    assert whole.values["turn"]["advance"].tolist() == [0.0, 1.0, 2.0, 0.0, 1.0]
-    assert whole.lost.tolist() == [False, True, False, False, False]
-    assert [heading[0, 0] for heading in whole.headings] == [0.0, 2.0, 0.0, 1.0]
-
-
-def test_forty_circles_are_kept_for_the_report_and_all_headings(ship):
-    criteria = criteria_of(np.zeros(45, dtype=bool))
-    found = with_paths(criteria, NominalRuns("", ""), sailed(45))
-    assert [path[0, 0] for path in found.circle_paths] == list(range(40))
-    assert len(found.zigzag_headings) == 45

@@ -7,27 +7,21 @@ import numpy as np
 import pytest
 
 from agents import PID
-from agents.cli.standard_trials import standard_trials
 from agents.identifying import identification_settings, identify_ship
 from agents.rollouts.course_keeping import sail
 from agents.verification.chain import or_simpler, write_agents, write_findings
 from agents.verification.closed_loop import SHARES, ClosedLoop, loses_too_many
-from agents.verification.page import designs_of
 from agents.verification.possible_draws import gathers_speed, is_possible
 from agents.verification.refusal import (
-    Steering,
-    helpful_trial,
     lost_control,
     refused_designs,
     remark_on_damping,
     rudder_effect,
     simpler_structures,
-    why_driven,
     why_refused,
 )
-from agents.verification.result import verification_metrics
 from identification.design.experiment import advise
-from shipgym import InputError, ShipFile, Trial, load_model
+from shipgym import InputError, ShipFile, load_model
 
 
 @pytest.fixture
@@ -38,17 +32,6 @@ def fit(chain):
 def test_nothing_is_refused_that_steers_as_in_the_trials(fit):
     assert why_refused(fit) is None
     assert rudder_effect([t for t in fit.trials if t.use == "fit"], fit.model) > 10.0
-
-
-def test_a_gap_in_a_log_has_no_say_in_the_effect_of_the_rudder(fit):
-    fitted = [trial for trial in fit.trials if trial.use == "fit"]
-    whole = rudder_effect(fitted, fit.model)
-    gap = 5.0 * fit.model.travel_time
-    parted = []
-    for trial in fitted:
-        later = np.where(trial.t > trial.t[len(trial) // 2], gap, 0.0)
-        parted.append(Trial(trial.t + later, trial.channels, name=trial.name))
-    assert rudder_effect(parted, fit.model) == pytest.approx(whole, rel=0.3)
 
 
 def test_steering_to_the_other_side_than_in_the_trials_is_refused(fit):
@@ -188,31 +171,6 @@ def test_a_design_that_loses_models_is_given_slower(fit):
     assert held.in_words.endswith("of the first design's bandwidth")
 
 
-@pytest.mark.parametrize(("windows", "known"), [(4.5, False), (5.5, True)])
-def test_a_trial_of_less_than_four_changes_says_nothing_of_the_rudder(windows, known):
-    """Changes over half a ship length; three numbers are found from them."""
-    ship = load_model("mariner")
-    window = 0.5 * ship.particulars["length"] / ship.particulars["speed"]
-    t = np.linspace(0.0, windows * window, 400)
-    rate = 0.004 * np.sin(0.11 * t) + 1e-4 * np.sin(1.7 * t)
-    trial = Trial(t, {"r": rate, "delta": 0.1 * np.cos(0.07 * t)})
-    found = rudder_effect([trial], ship)
-    assert (found != 0.0) == known
-    assert np.isfinite(found)
-
-
-def test_two_simpler_structures_are_named_at_most():
-    ranking = [
-        stood("a", 9),
-        stood("b", 7),
-        stood("c", 6),
-        stood("b", 5),
-        stood("d", 4),
-    ]
-    assert simpler_structures(ranking, "a") == ["b", "c"]
-    assert simpler_structures(ranking, "unknown") == []
-
-
 def test_designs_that_lose_control_are_not_written(chain, tmp_path):
     result = chain[1]
     found, fit = result.verification, result.identification
@@ -262,41 +220,3 @@ def test_a_model_that_is_refused_gives_a_report_that_says_why(chain, tmp_path):
     page = (tmp_path / "report.html").read_text()
     assert f"No autopilot is given: {why}" in page
     assert "Worst errors on held-out trials: " in page
-
-
-def test_gains_have_one_sign_in_report_and_metrics(chain):
-    found = chain[1].verification
-    view = designs_of(found)
-    shown = {signal: gains for signal, _, gains in view["gains"]}
-    metrics = verification_metrics(found)["controllers"]
-    own = dict(zip(view["linear"], shown["yaw rate"], strict=True))
-    assert own["PID"] == ("derivative", metrics["pid"]["gains"]["derivative"])
-    assert own["LQ"] == ("yaw_rate", metrics["lq"]["gains"]["yaw_rate"])
-
-
-@pytest.mark.parametrize(("row", "name"), [(0, "sway damping"), (1, "yaw damping")])
-def test_a_damping_that_drives_the_motion_in_60_of_61_models_is_refused(row, name):
-    sound = Steering(np.array([[-1.0, -0.3], [-1.5, -2.0]]), np.array([[-0.1], [0.5]]))
-    assert sound.steady_side > 0.0  # to starboard
-    A = sound.A.copy()
-    A[row, row] = 0.1
-    driven = sound._replace(A=A)
-    assert name in why_driven([driven] * 60 + [sound])
-    assert why_driven([driven] * 59 + [sound] * 2) is None
-
-
-def test_where_nothing_can_be_advised_a_zigzag_to_both_sides_helps(fit):
-    assert helpful_trial(fit) != "a 20/20 zigzag to both sides"
-    without_table = replace(fit, model=load_model("kvlcc2"))
-    assert helpful_trial(without_table) == "a 20/20 zigzag to both sides"
-
-
-def test_one_manoeuvre_that_fails_does_not_lose_the_others():
-    """A ship that gains speed by herself runs away in some, and sails others."""
-    ship = load_model("mariner")
-    wild = replace(
-        ship, coefficients=ship.coefficients | {"X_u": -0.5 * ship.coefficients["X_u"]}
-    )
-    found = standard_trials(wild)
-    assert found.refused
-    assert found.indices

@@ -5,7 +5,6 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from importlib.resources import files
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from agents.cli.autopilot import print_autopilot
 from agents.cli.standard_trials import StandardTrials
 from agents.cli.trials_page import readable_index, write_page
 from agents.output import check_page
-from agents.verification.figures import band, translucent
+from agents.verification.figures import translucent
 from agents.verification.page import write_report
 from shipgym import InputError, Trial, load_model
 from shipgym.manoeuvres import IndexInterval, standard_manoeuvres
@@ -139,29 +138,6 @@ def test_the_chain_prints_its_tables(chain, capsys):
     for name in metrics["imo"]:
         assert name in printed
     assert "report: report.html" in printed
-
-
-def test_designs_that_are_refused_are_warned_of(chain, capsys):
-    found = chain[1].verification.manoeuvres
-    result = SimpleNamespace(
-        metrics=chain[1].metrics,
-        stable=True,
-        refusal=None,
-        remark=None,
-        identification=chain[1].identification,
-        verification=SimpleNamespace(
-            manoeuvres=found,
-            refused={"lqg": "no such sensor"},
-            retuned={"pid": "slower"},
-            tuned={"lq": "9 candidates"},
-        ),
-    )
-    print_autopilot(result, Path("report.html"), DRAWS)
-    shown = capsys.readouterr()
-    assert "PID was retuned to hold the models drawn: slower" in shown.out
-    assert "settings of LQ were searched: 9 candidates" in shown.out
-    *_, last = shown.err.splitlines()
-    assert last == "warning: no LQG autopilot: no such sensor"
 
 
 def test_every_figure_has_a_caption_and_a_place(source):
@@ -333,12 +309,6 @@ def test_a_minus_is_a_minus():
 )
 def test_a_probability_is_certain_only_if_it_is(share, shown):
     assert percent(share) == shown
-
-
-def test_a_band_is_the_95_per_cent_interval():
-    t, values = np.arange(3.0), np.linspace(0.0, 1.0, 101)[:, None] * np.ones(3)
-    drawn = band(t, values, "draws", "#1d70b8")
-    assert np.asarray(drawn.y, dtype=float) == pytest.approx([0.975] * 3 + [0.025] * 3)
 
 
 def test_a_translucent_colour():
