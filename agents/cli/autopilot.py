@@ -58,7 +58,7 @@ def autopilot_command(
         Option(
             min=0.0,
             metavar="SECONDS",
-            help="Search the settings of each design, so long.",
+            help="Tune each design for this many seconds of processor time.",
         ),
     ] = 0.0,
     engine: EngineName = "local",
@@ -120,7 +120,7 @@ def print_autopilot(result: AutopilotResult, report: Path, draws: int) -> None:
         warn(warning)
     if result.verification is not None:
         for name, how in result.verification.tuned.items():
-            say(f"settings of {name.upper()} were searched: {how}")
+            say(f"settings of {name.upper()} were tuned: {how}")
         for name, how in result.verification.retuned.items():
             say(f"{name.upper()} was retuned to hold the models drawn: {how}")
         for name, reason in result.verification.refused.items():

@@ -55,7 +55,7 @@ def identify_options(
         Option(help="How coefficients are fitted; default: the file's, else tls-svm."),
     ] = None,
     kernel: Annotated[
-        str | None, Option(help="Kernel on what a reference ship leaves: rbf.")
+        str | None, Option(help="Kernel for the residual of the reference ship: rbf.")
     ] = None,
     prior: Annotated[
         str | None,

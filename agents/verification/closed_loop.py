@@ -1,7 +1,10 @@
 """Designs in closed loop with the models drawn: judged there, and retuned there.
 
 A design that loses too many of them is given another bandwidth, the first in a row of
-shares that holds them, before it is refused.
+shares that holds them, before it is refused. A covariance reaches further than the
+trials allow: a model that runs away in a trial that the ship was put through, or
+gathers speed without end on a straight course, does not count, since no autopilot
+steers the speed.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -13,11 +16,12 @@ import numpy as np
 from agents.controllers.controller import Controller
 from agents.controllers.designs import with_bandwidth
 from agents.rollouts.course_keeping import Episodes, sail
-from agents.verification.possible_draws import is_possible
 from agents.verification.tracks import Track, judged_task, keep_track, track_task
+from identification.samples.prediction import predict
 from shipgym.arrays import Flags, Integers
-from shipgym.errors import InputError
+from shipgym.errors import InputError, UnstableModelError
 from shipgym.models import ShipModel
+from shipgym.models.simulate import orders, simulate
 from shipgym.trials.trial import Trial
 
 #: Share of the models drawn that an autopilot may lose control of.
@@ -152,3 +156,35 @@ def lost_tracks(track: Track) -> Flags:
     if not track.arrived[0]:
         return np.ones(len(track.arrived) - 1, dtype=np.bool_)
     return ~track.arrived[1:]
+
+
+def is_possible(model: ShipModel, trials: Sequence[Trial]) -> bool:
+    """Return False for a model that runs away in a trial or straight ahead."""
+    if gathers_speed(model):
+        return False
+    return all(not _runs_away(model, trial) for trial in trials)
+
+
+def _runs_away(model: ShipModel, trial: Trial) -> bool:
+    try:
+        return predict(model, trial) is None
+    except InputError:  # it lacks a channel that the simulation needs
+        return False
+
+
+def gathers_speed(model: ShipModel) -> bool:
+    """Return True if a model's speed runs away with the rudder amidships.
+
+    One that turns off its course before may still be steered.
+    """
+    lengths = 100.0
+    steps_per_length = 30
+    dt = model.travel_time / steps_per_length
+    amidships = np.zeros(int(lengths * steps_per_length))
+    try:
+        simulate(model, orders(model, amidships), dt)
+    except UnstableModelError as error:
+        yaw_rate = error.state.get("r", 0.0)
+        turned = abs(yaw_rate) * model.travel_time
+        return bool(turned < 1.0)
+    return False

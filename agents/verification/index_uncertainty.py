@@ -1,6 +1,6 @@
 """Uncertainty of manoeuvre indices and criteria, by models drawn from a covariance."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -121,33 +121,6 @@ def _index_intervals(
         no_indices[name] = test.no_indices
         evaluations[name] = test.evaluate
     return intervals_of(no_indices, draws, evaluations)
-
-
-def joined(parts: Iterable[SailedDraws]) -> SailedDraws:
-    """Results of all draws, from parts in their order."""
-    parts = list(parts)
-    values: dict[str, dict[str, Floats]] = {}
-    ran_away = {}
-    for name, indices in parts[0].values.items():
-        values[name] = {}
-        for index in indices:
-            of_parts = [part.values[name][index] for part in parts]
-            values[name][index] = np.concatenate(of_parts)
-        flags = [part.ran_away[name] for part in parts]
-        ran_away[name] = np.concatenate(flags)
-
-    headings: list[Floats] = []
-    paths: list[Floats] = []
-    for part in parts:
-        headings += part.headings
-        paths += part.paths
-    return SailedDraws(
-        values=values,
-        ran_away=ran_away,
-        lost=np.concatenate([part.lost for part in parts]),
-        headings=headings,
-        paths=paths,
-    )
 
 
 def uncertainty_of(

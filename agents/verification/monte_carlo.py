@@ -17,7 +17,6 @@ from agents.rollouts.course_keeping import Episodes, sail
 from agents.verification.index_uncertainty import (
     ManoeuvreUncertainty,
     SailedDraws,
-    joined,
     nominal_runs,
     sail_draws,
     uncertainty_of,
@@ -75,23 +74,24 @@ def monte_carlo(
 
     jobs = draw_jobs(controllers, model, drawn, seed)
     parts = run_jobs(do_draws, jobs, where, on_progress)
-    sailed = joined([SailedDraws(**part["sailed"]) for part in parts])
-    course_unstable = [part["course_unstable"] for part in parts]
-    by_controller = zip(*[part["episodes"] for part in parts], strict=True)
+    whole = joined(parts)
+    by_controller = whole["episodes"].values()
     return MonteCarlo(
         draws=tuple(drawn),
-        manoeuvres=uncertainty_of(model, nominal, sailed),
-        course_unstable=np.concatenate(course_unstable),
-        episodes=tuple(map(_joined_episodes, by_controller)),
+        manoeuvres=uncertainty_of(model, nominal, SailedDraws(**whole["sailed"])),
+        course_unstable=whole["course_unstable"],
+        episodes=tuple(Episodes(**columns) for columns in by_controller),
     )
 
 
-def _joined_episodes(parts: Sequence[dict[str, Any]]) -> Episodes:
-    """Episodes of one controller from parts in their order."""
-    columns = {}
-    for name in parts[0]:
-        columns[name] = np.concatenate([part[name] for part in parts])
-    return Episodes(**columns)
+def joined(parts: Sequence[Any]) -> Any:
+    """Results of all draws, from parts in their order: arrays and lists by name."""
+    first = parts[0]
+    if isinstance(first, dict):
+        return {name: joined([part[name] for part in parts]) for name in first}
+    if isinstance(first, list):
+        return [one for part in parts for one in part]
+    return np.concatenate(parts)
 
 
 def draw_jobs(
@@ -129,11 +129,11 @@ def do_draws(job: dict[str, Any]) -> dict[str, Any]:
         draws.append(replace(model, name=name, coefficients=coefficients))
 
     seeds = job["first_seed"] + np.arange(len(draws))
-    episodes = []
-    for content in job["controllers"]:
+    episodes = {}
+    for number, content in enumerate(job["controllers"]):
         controller = read_controller(content, "controller")
         sailed = sail(controller, draws, judged_task(), seeds)
-        episodes.append(asdict(sailed))
+        episodes[str(number)] = asdict(sailed)
     course_unstable = [not keeps_course(draw) for draw in draws]
     return {
         "sailed": sail_draws(model, draws)._asdict(),

@@ -72,10 +72,6 @@ class Verification:
     #: what a search of settings found, by their kind
     tuned: dict[str, str] = field(default_factory=dict)
 
-    def of_counted(self, values: Flags) -> Flags:
-        """Those of the draws that count."""
-        return values if self.counted is None else values[self.counted]
-
     @property
     def left_out(self) -> int:
         """Number of draws that do not count."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,10 +14,10 @@ from agents.controllers.registry import controller_class
 from agents.jobs import HERE, JobEngine
 from agents.rollouts.course_keeping import Episodes, sail, step_response
 from agents.training.controller_space import searched_kinds
-from agents.verification.closed_loop import ClosedLoop, Held
-from agents.verification.monte_carlo import MonteCarlo, monte_carlo
+from agents.verification.closed_loop import ClosedLoop
+from agents.verification.monte_carlo import monte_carlo
 from agents.verification.result import STEP_DEG, Pilot, Verification
-from agents.verification.tracks import Track, judged_task, track_task
+from agents.verification.tracks import judged_task, track_task
 from agents.verification.tuned import tuned_design
 from identification.progress import Progress
 from shipgym.checks import quoted
@@ -68,10 +68,23 @@ def verify(
         seeds=seed + np.arange(draws),
         trials=trials,
     )
-    judged = judged_designs(loop, designed, found)
-    autopilots, episodes = with_guests(judged.courses, guests, loop)
-    ships = [model, *stable_draws(found)]
-    pilots = run_pilots(autopilots, episodes, ships, tell)
+    courses = []
+    for controller, first in zip(designed.controllers, found.episodes, strict=True):
+        courses.append(loop.keep_course(controller, first))
+    tracks = [loop.keep_track(guide) for guide in designed.guides]
+    steered: list[tuple[Agent, Episodes]] = []
+    for held in courses:
+        steered.append((held.controller, held.outcome))
+    for guest in guests:
+        steered.append((guest, sail(guest, loop.draws, judged_task(), loop.seeds)))
+
+    stable = np.flatnonzero(~found.manoeuvres.unstable)
+    ships = [model, *[found.draws[number] for number in stable.tolist()]]
+    pilots = run_pilots(steered, ships, tell)
+    retuned = {}
+    for held in (*courses, *tracks):
+        if held.share != 1.0:
+            retuned[str(held.controller.kind)] = held.in_words
     return Verification(
         draws=draws,
         seed=seed,
@@ -80,81 +93,26 @@ def verify(
         nomoto=nomoto(model),
         pilots=tuple(sorted(pilots, key=_mean_cost)),
         refused=designed.refused,
-        tracks=judged.kept_tracks,
+        tracks=tuple(held.outcome for held in tracks),
         counted=loop.counted,
-        retuned=judged.retuned,
+        retuned=retuned,
         tuned=designed.tuned,
     )
 
 
-class Judged(NamedTuple):
-    """Designs as they are given or refused, after they were judged."""
-
-    courses: list[Held]  # that keep a heading
-    tracks: list[Held]  # that keep a track
-
-    @property
-    def kept_tracks(self) -> tuple[Track, ...]:
-        """The tracks themselves."""
-        return tuple(held.outcome for held in self.tracks)
-
-    @property
-    def retuned(self) -> dict[str, str]:
-        """How designs were changed, by their kind."""
-        words = {}
-        for held in (*self.courses, *self.tracks):
-            if held.share != 1.0:
-                words[str(held.controller.kind)] = held.in_words
-        return words
-
-
-def with_guests(
-    courses: Sequence[Held], guests: Sequence[Agent], loop: ClosedLoop
-) -> tuple[list[Agent], list[Episodes]]:
-    """Designs and guests that keep a heading, and the episodes of each."""
-    autopilots: list[Agent] = [held.controller for held in courses]
-    episodes = [held.outcome for held in courses]
-    for guest in guests:
-        autopilots.append(guest)
-        episodes.append(sail(guest, loop.draws, judged_task(), loop.seeds))
-    return autopilots, episodes
-
-
-def stable_draws(found: MonteCarlo) -> list[ShipModel]:
-    """Models drawn that run away in no manoeuvre."""
-    stable = np.flatnonzero(~found.manoeuvres.unstable)
-    return [found.draws[number] for number in stable.tolist()]
-
-
-def judged_designs(loop: ClosedLoop, designed: Designed, found: MonteCarlo) -> Judged:
-    """Designs after the closed loop with the models drawn, some of them retuned."""
-    courses = []
-    for controller, first in zip(designed.controllers, found.episodes, strict=True):
-        held = loop.keep_course(controller, first)
-        courses.append(held)
-    tracks = [loop.keep_track(guide) for guide in designed.guides]
-    return Judged(courses, tracks)
-
-
 def run_pilots(
-    autopilots: Sequence[Any],
-    episodes: Sequence[Episodes],
+    steered: Sequence[tuple[Agent, Episodes]],
     ships: Sequence[ShipModel],
     tell: Progress,
 ) -> list[Pilot]:
     """Autopilots with the episodes of each and its step responses on ships."""
-    n = len(autopilots)
-    keys = unique_keys([str(autopilot.name) for autopilot in autopilots])
+    n = len(steered)
+    keys = unique_keys([str(autopilot.name) for autopilot, _ in steered])
     pilots = []
-    for i, key in enumerate(keys):
+    for i, (autopilot, episodes) in enumerate(steered):
         tell("step responses", i, n)
-        pilot = Pilot(
-            key=key,
-            controller=autopilots[i],
-            episodes=episodes[i],
-            step=step_response(autopilots[i], ships, STEP_DEG),
-        )
-        pilots.append(pilot)
+        step = step_response(autopilot, ships, STEP_DEG)
+        pilots.append(Pilot(keys[i], autopilot, episodes, step))
     tell("step responses", n, n)
     return pilots
 

@@ -9,7 +9,6 @@ from agents.cli.tables import ranking_table
 from agents.jobs import JobEngine
 from agents.verification.chain import build_autopilot, verify
 from agents.verification.index_uncertainty import (
-    joined,
     nominal_runs,
     sail_draws,
     uncertainty_of,
@@ -243,8 +242,8 @@ def test_unstable_draws_count_as_failed_and_are_never_dropped():
     model = load_model("mariner")
     backwards = dict(model.coefficients) | {"N_r": 5e-3}  # yaw that feeds itself
     wild = type(model)(**{**_fields(model), "coefficients": backwards})
-    sailed = [sail_draws(model, [model, wild]) for _ in range(2)]
-    found = uncertainty_of(model, nominal_runs(model), joined(sailed))
+    sailed = sail_draws(model, [model, wild, model, wild])
+    found = uncertainty_of(model, nominal_runs(model), sailed)
     assert found.unstable.tolist() == [False, True, False, True]
     assert found.criteria["advance"].share_passed == 0.5
     assert len(found.zigzag_headings) == 2

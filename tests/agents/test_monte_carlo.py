@@ -1,7 +1,6 @@
 """Monte Carlo gives the same in this process, in others, resumed, and draw by draw."""
 
 from dataclasses import fields
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,12 +8,9 @@ import pytest
 from agents import LQ, PID, sail
 from agents.jobs import JobEngine
 from agents.verification.index_uncertainty import (
-    NominalRuns,
-    SailedDraws,
     nominal_runs,
     sail_draws,
     uncertainty_of,
-    with_paths,
 )
 from agents.verification.monte_carlo import monte_carlo
 from shipgym import InputError, load_model
@@ -102,32 +98,3 @@ def test_wrong_arguments(ship, pilots):
         monte_carlo(pilots, ship, 1)
     with pytest.raises(InputError, match="Did you mean 'local'"):
         JobEngine("lokal")
-
-
-def sailed(count, lost=()):
-    """Draws, some without runs that are kept; headings and paths by their number."""
-    numbers = [np.full((3, 2), float(k)) for k in range(count) if k not in lost]
-    return SailedDraws(
-        values={"turn": {"advance": np.arange(float(count))}},
-        ran_away={"turn": np.zeros(count, dtype=bool)},
-        lost=np.isin(np.arange(count), lost),
-        headings=numbers,
-        paths=numbers,
-    )
-
-
-def criteria_of(*ran_away):
-    """Criteria, some with draws that run away, one that could not be sailed."""
-    drawn = [SimpleNamespace(drawn=SimpleNamespace(ran_away=row)) for row in ran_away]
-    return dict(enumerate([*drawn, SimpleNamespace(drawn=None)]))
-
-
-def test_draws_that_run_away_in_any_manoeuvre_count_once_and_have_no_paths(ship):
-    """Of seven draws the second runs away in one criterion, the fifth has no runs."""
-    away = np.arange(7) == 1
-    criteria = criteria_of(away, np.zeros(7, dtype=bool))
-    found = with_paths(criteria, NominalRuns("zigzag", "circle"), sailed(7, [4]))
-    assert found.unstable.tolist() == [False, True, False, False, True, False, False]
-    numbers = [path[0, 0] for path in found.circle_paths]
-    assert numbers == found.zigzag_headings[:, 0, 0].tolist() == [0, 2, 3, 5, 6]
-    assert (found.zigzag, found.circle) == ("zigzag", "circle")

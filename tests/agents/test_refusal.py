@@ -10,8 +10,13 @@ from agents import PID
 from agents.identifying import identification_settings, identify_ship
 from agents.rollouts.course_keeping import sail
 from agents.verification.chain import or_simpler, write_agents, write_findings
-from agents.verification.closed_loop import SHARES, ClosedLoop, loses_too_many
-from agents.verification.possible_draws import gathers_speed, is_possible
+from agents.verification.closed_loop import (
+    SHARES,
+    ClosedLoop,
+    gathers_speed,
+    is_possible,
+    loses_too_many,
+)
 from agents.verification.refusal import (
     lost_control,
     refused_designs,
