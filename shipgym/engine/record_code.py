@@ -73,13 +73,7 @@ def loader(rows: Rows, lanes: int = LANES) -> Function:
 
 def storer(rows: Rows, lanes: int = LANES) -> Function:
     """Write `store(array, lane, record)`, which writes a record to a tile or vector."""
-    names: dict[str, Any] = {}
-    lines = []
-    for path, row in rows.numbers.items():
-        entry = _entry(row, lanes, names)
-        lines.append(f"{entry} = {_part('record', path)}")
-    name = f"store_{rows.record.__name__}"
-    return written(name, "array, lane, record", lines, names)
+    return _storer(rows, lanes, "array, lane, record", lambda path, number: number)
 
 
 def clipped_storer(rows: Rows, bounds: Mapping[str, tuple[float, float]]) -> Function:
@@ -87,16 +81,28 @@ def clipped_storer(rows: Rows, bounds: Mapping[str, tuple[float, float]]) -> Fun
 
     Each number is multiplied by that of the record `scale`.
     """
+
+    def clipped(path: str, number: str) -> str:
+        low, high = bounds[path]
+        scaled = f"{number} * {_part('scale', path)}"
+        return f"min(max({scaled}, {float(low)!r}), {float(high)!r})"
+
+    return _storer(rows, LANES, "array, lane, record, scale", clipped)
+
+
+def _storer(
+    rows: Rows,
+    lanes: int,
+    arguments: str,
+    stored: Callable[[str, str], str],
+) -> Function:
+    """Write a function that stores of each number what `stored` makes of its source."""
     names: dict[str, Any] = {}
     lines = []
     for path, row in rows.numbers.items():
-        low, high = bounds[path]
-        entry = _entry(row, LANES, names)
-        scaled = f"{_part('record', path)} * {_part('scale', path)}"
-        at_least = f"max({scaled}, {float(low)!r})"
-        lines.append(f"{entry} = min({at_least}, {float(high)!r})")
-    name = f"store_{rows.record.__name__}"
-    return written(name, "array, lane, record, scale", lines, names)
+        entry = _entry(row, lanes, names)
+        lines.append(f"{entry} = {stored(path, _part('record', path))}")
+    return written(f"store_{rows.record.__name__}", arguments, lines, names)
 
 
 def zeros(record: Record) -> Function:

@@ -120,12 +120,12 @@ def _check_record(record: Any, name: str, where: str) -> None:
     for field, kind in kinds.items():
         place = f"{field_place(record, field, where)}: {name}.{field}"
         default = record._field_defaults.get(field)
-        is_last_setting = name.startswith("Settings") and field == list(kinds)[-1]
-        if is_list(kind):
-            _check_list(kind, default, place, is_last_setting)
-        else:
+        is_last = field == list(kinds)[-1]
+        may_be_list = name == "Settings" and is_last and get_origin(kind) is not tuple
+        if not (is_list(kind) and may_be_list):
             _check_kind(kind, f"{name}.{field}", place)
-        if kind in (float, int, bool) and not isinstance(default, Real | None):
+        is_number = kind in (float, int, bool) and isinstance(default, Real | None)
+        if isinstance(default, str) or (kind in (float, int, bool) and not is_number):
             raise unexpected(place, "a number, or a list as the last field", default)
 
     if name == "Settings":
@@ -144,15 +144,6 @@ def _check_kind(kind: Any, name: str, place: str) -> None:
             _check_kind(entry, name, place)
     elif is_list(kind):
         raise not_of_numbers(place, kind)
-
-
-def _check_list(kind: Any, default: Any, place: str, is_last_setting: bool) -> None:
-    """Refuse a list that is not the last of settings, and an array without a size."""
-    is_setting = "Settings" in place
-    if get_origin(kind) is tuple or not is_setting:
-        raise not_of_numbers(place, kind)
-    if isinstance(default, str) or not is_last_setting:
-        raise unexpected(place, "a number, or a list as the last field", default)
 
 
 def not_of_numbers(place: str, kind: Any) -> InputError:

@@ -1,12 +1,11 @@
 """The environments' ids, and tasks of your own."""
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import gymnasium
 
-from shipgym.checks import check_choice, check_text, data_only
+from shipgym.checks import check_text
 from shipgym.errors import InputError
 
 ENTRY_POINT = "shipgym.envs.ship_env:ShipEnv"  # of every environment
@@ -122,17 +121,6 @@ def registered() -> dict[str, dict[str, Any]]:
         if spec.entry_point == ENTRY_POINT and "task" in spec.kwargs:
             found[name] = spec.kwargs
     return found
-
-
-def check_named(name: str, arguments: Mapping[str, Any], where: str) -> None:
-    """Refuse an id and arguments, which data name, that would run other code.
-
-    Gymnasium imports the module of an id `module:id`, and a reward may be a Python
-    file. InputError begins with `where`, such as "episode".
-    """
-    known = registered()
-    check_choice(name, known, f"{where}: environment")
-    data_only(arguments, f"{where}: arguments", known[name])
 
 
 def _register(env_id: str, options: dict[str, Any]) -> None:

@@ -52,8 +52,7 @@ class Circle:
     filled: bool = False
 
     def __post_init__(self) -> None:
-        check_number(self.x, "Circle: x")
-        check_number(self.y, "Circle: y")
+        check_finite((self.x, self.y), "Circle: x, y")
         check_number(self.radius, "Circle: radius", above=0.0)
         check_colour(self.colour, "Circle: colour")
 
@@ -66,15 +65,12 @@ class ShipOutline:
     y: float
     psi: float  # rad, heading
     length: float  # m
-    beam: float | None = None  # m, by default a seventh of the length
+    beam: float | None = None  # m, by default 0.15 of the length
     colour: Colour = "ink"
 
     def __post_init__(self) -> None:
-        for name in ("x", "y", "psi"):
-            check_number(getattr(self, name), f"ShipOutline: {name}")
+        check_finite((self.x, self.y, self.psi), "ShipOutline: x, y, psi")
         check_number(self.length, "ShipOutline: length", above=0.0)
-        if self.beam is not None:
-            check_number(self.beam, "ShipOutline: beam", above=0.0)
         check_colour(self.colour, "ShipOutline: colour")
 
 

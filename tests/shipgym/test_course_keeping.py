@@ -16,7 +16,6 @@ from shipgym import InputError
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.random import DRAW, GOLDEN, mix
 from shipgym.envs.engine import Engine
-from shipgym.envs.randomisation import Randomisation
 from shipgym.ships import Envelope
 from shipgym.tasks.contract import Interval
 from shipgym.tasks.scales import OBSERVATION_NAMES, control_interval, observation_scales
@@ -142,41 +141,6 @@ def test_the_cost_is_the_classical_one_and_the_sum_of_its_parts(mariner):
         )
 
 
-def test_set_points_change_during_an_episode_and_are_kept_with_zero_change():
-    env = make().unwrapped
-    headings = set()
-    observation, _ = env.reset(seed=3)
-    for _ in range(600):
-        observation, *_ = env.step(pd(observation))
-        headings.add(env.physical_state()["set_point"])
-    assert 2 <= len(headings) <= 7
-    fixed = make(course_change_deg=0.0).unwrapped
-    fixed.reset(seed=3)
-    state = fixed.physical_state()
-    assert state["set_point"] == state["psi"]
-
-
-def test_an_episode_is_a_function_of_its_seed():
-    first, second, other = (steer(make(), pd, seed=seed)[0] for seed in (5, 5, 6))
-    np.testing.assert_array_equal(first, second)
-    assert not np.array_equal(first, other)
-
-
-def test_later_episodes_follow_from_the_first_seed_and_differ():
-    def headings(seed):
-        env = make()
-        env.reset(seed=seed)
-        return [env.reset()[1]["heading_error"] for _ in range(3)]
-
-    assert headings(1) == headings(1)
-    assert len(set(headings(1))) == 3
-
-
-def test_the_time_limit_truncates():
-    rewards, _, terminated, truncated = steer(make(episode_steps=50), pd)
-    assert (len(rewards), terminated, truncated) == (50, False, True)
-
-
 def test_losing_control_ends_the_episode_and_never_pays():
     hard_over = lambda _: np.ones(1, dtype=np.float32)  # noqa: E731
     lost, infos, terminated, truncated = steer(make(), hard_over)
@@ -236,19 +200,6 @@ def test_a_model_that_runs_away_ends_the_episode_with_numbers(mariner):
     assert np.all(np.isfinite(list(env.physical_state().values())))
 
 
-def test_each_lane_of_a_batch_is_the_single_environment(mariner):
-    engine = Engine(mariner, 70)
-    observations = engine.reset(np.arange(70))
-    lane, env = 66, make()
-    single, _ = env.reset(seed=66)
-    for _ in range(300):
-        np.testing.assert_array_equal(observations[lane], single)
-        actions = np.stack([pd(observation) for observation in observations])
-        observations, rewards, *_ = engine.step(actions)
-        single, reward, *_ = env.step(actions[lane])
-        assert rewards[lane] == reward
-
-
 def test_each_lane_may_have_a_ship_of_its_own(mariner):
     slow = replace(mariner, coefficients={**mariner.coefficients, "N_d": 0.0007})
     engine = Engine([mariner, slow], 2)
@@ -306,27 +257,6 @@ def test_wrong_actions(action, message):
     env.reset(seed=0)
     with pytest.raises(InputError, match=message):
         env.step(action)
-
-
-def test_wrong_batches(mariner):
-    engine = Engine(mariner, 2)
-    with pytest.raises(InputError, match=r"actions: expected shape .* got \(3, 1\)"):
-        engine.step(np.zeros((3, 1)))
-    with pytest.raises(InputError, match="got nan in lane 1"):
-        engine.step([[0.0], [np.nan]])
-    pool = Randomisation(speed_range=(0.8, 1.0))
-    with pytest.raises(
-        InputError, match="models: expected a ship for each lane or a pool"
-    ):
-        Engine([mariner, mariner], 2, randomisation=pool)
-    with pytest.raises(InputError, match="models: expected one structure"):
-        Engine([mariner, shipgym.load_model("kvlcc2")], 2)
-    with pytest.raises(InputError, match="num_envs: expected"):
-        Engine(mariner, 0)
-    with pytest.raises(
-        InputError, match="expected 1, or one for each of 2 lanes, got 3"
-    ):
-        Engine([mariner] * 3, 2)
 
 
 SHIP = Ship(160.0, 8.0, 0.6, 0.05, 0.0, 1.5, np.inf, 8.0)

@@ -13,7 +13,7 @@ import pytest
 import shipgym
 from shipgym import InputError
 from shipgym.envs.randomisation import N_SPEEDS, POOL_SIZE
-from shipgym.sea import Waves, Weather, Wind
+from shipgym.sea import Waves, Weather
 from shipgym.ships import Envelope
 from shipgym.tasks.definition import read_definition
 from shipgym.tasks.scales import rounded_interval
@@ -84,22 +84,6 @@ def test_noise_has_the_deviation_of_a_sea_trials_sensors(noise):
     assert abs(np.corrcoef(second["sway"], second["surge"])[0, 1]) < 5.0 / np.sqrt(
         count
     )
-
-
-def test_noise_is_only_shown_and_none_is_none():
-    plain, none, noisy = (
-        make(**options) for options in ({}, {"noise": 0.0}, {"noise": 2.0})
-    )
-    for env in (plain, none, noisy):
-        env.reset(seed=3)
-    for k in range(60):
-        action = np.array([np.sin(k / 5.0)], dtype=np.float32)
-        expected, same, other = (env.step(action) for env in (plain, none, noisy))
-        np.testing.assert_array_equal(expected[0], same[0])
-        assert expected[1:] == same[1:]
-        assert expected[1:] == other[1:]  # reward and info go by what is so
-        assert not np.array_equal(expected[0], other[0])
-        assert plain.physical_state() == noisy.physical_state()
 
 
 def waves_shown(measurement, **options):
@@ -224,23 +208,6 @@ def test_an_action_that_is_no_rudder_order_is_refused(wrong):
         env.step(wrong)
 
 
-def test_listed_course_changes_come_one_after_another():
-    changes = [20.0, -35.0, 10.0]
-    env = make(
-        course_changes_deg=changes,
-        change_interval_steps=40,
-        max_heading_error_deg=180.0,
-    )
-    env.reset(seed=9)
-    state = env.physical_state()
-    begun, courses = state["psi"], [state["set_point"]]
-    for _ in range(200):
-        env.step(np.zeros(1, dtype=np.float32))
-        courses.append(env.physical_state()["set_point"])
-    expected = begun + np.radians(np.repeat(np.cumsum(changes), [40, 40, 121]))
-    np.testing.assert_allclose(courses, expected, atol=1e-9)
-
-
 def test_extrapolating_costs_what_was_asked():
     normal = np.random.default_rng(0).normal
     known = Envelope.from_samples(
@@ -259,20 +226,6 @@ def test_extrapolating_costs_what_was_asked():
         costs.append(info["reward_envelope"])
     assert costs[0] == 0.0
     assert costs[-1] == -0.7
-
-
-def test_each_episode_has_one_of_several_seas():
-    windy = Weather(wind=Wind(12.0, from_deg=0.0))
-    env = many(400, sea=["calm", windy])
-    env.reset(seed=0)
-    wind = env.physical_state()["wind_speed"]
-    blows = wind > 1.0
-    assert 0.4 < blows.mean() < 0.6
-    assert np.all(wind[~blows] == 0.0)
-    single = make(sea=["calm", windy])
-    for seed in range(6):
-        single.reset(seed=seed)
-        assert single.physical_state()["wind_speed"] == pytest.approx(wind[seed])
 
 
 def test_shallow_water_makes_a_tanker_turn_wider():
@@ -352,21 +305,6 @@ def test_pages_name_every_setting_with_its_default(path):
         "run python scripts/document_settings.py"
     )
     assert "| `heading_scale_deg` | 30 | above 0 |" in text
-
-
-def test_weights_and_scales_are_settings():
-    env = gymnasium.make(
-        "shipgym/CourseKeeping-v0", rudder_weight=2.0, heading_scale_deg=10.0
-    ).unwrapped
-    env.reset(seed=0)
-    *_, info = env.step(np.array([1.0], dtype=np.float32))
-    rudder = env.physical_state()["delta"]
-    assert info["reward_heading"] == pytest.approx(
-        -((info["heading_error"] / np.radians(10.0)) ** 2)
-    )
-    assert info["reward_rudder"] == pytest.approx(
-        -2.0 * (rudder / np.radians(10.0)) ** 2
-    )
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import gymnasium
 import numpy as np
 import pytest
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
+from stable_baselines3.common.vec_env import DummyVecEnv
 
 import shipgym
 from shipgym import InputError, ShipVecEnv
@@ -127,24 +127,6 @@ def test_infos_are_reused_and_parts_of_them_given_on_request():
     assert isinstance(shorts[0][0]["extrapolating"], bool)
     assert shorts[2][0]["episode"]["l"] == 3
     assert set(shorts[3][0]) == {"heading_error", "extrapolating"}
-
-
-def test_statistics_are_those_of_vec_monitor():
-    env = ours(PATH, 3, episode_steps=5, seed=1)
-    same = ours(PATH, 3, episode_steps=5, seed=1)
-    assert env.env_is_wrapped(Monitor) == [True] * 3
-    assert env.env_is_wrapped(gymnasium.wrappers.TimeLimit, indices=[0]) == [False]
-    with pytest.warns(UserWarning, match="already wrapped"):
-        watched = VecMonitor(env, info_keywords=("success",))
-    watched.reset()
-    same.reset()
-    for _ in range(5):
-        *_, dones, infos = watched.step(np.zeros((3, 1), np.float32))
-        *_, own = same.step(np.zeros((3, 1), np.float32))
-    assert dones.all()
-    earned = float(infos[0]["episode"]["r"])
-    assert own[0]["episode"]["r"] == pytest.approx(earned, rel=1e-6)
-    assert own[0]["episode"]["l"] == infos[0]["episode"]["l"] == 5
 
 
 def test_attributes_and_methods_of_rows():

@@ -79,22 +79,6 @@ def test_a_task_works_everywhere(fairway):
         assert info["cost"] == pytest.approx(-sum(parts))
 
 
-def test_the_limit_is_what_it_says(fairway):
-    """At service speed the zone costs the square of the excess; a ship that fails pays
-    for the rest."""
-    env = gymnasium.make(fairway, zone_begins=0.0, speed_limit=0.5).unwrapped
-    env.reset(seed=0)
-    *_, info = env.step(np.array([0.0, 1.0], dtype=np.float32))
-    u = env.physical_state()["u"] / env.model.particulars["speed"]
-    assert info["speeding"]
-    assert info["reward_over_speed"] == pytest.approx(-50.0 * (u - 0.5) ** 2)
-    over, steps = False, 1
-    while not over:
-        *_, over, _, info = env.step(np.array([1.0, 1.0], dtype=np.float32))
-        steps += 1
-    assert info["reward_end"] == pytest.approx(-52.0 * (600 - steps))
-
-
 def test_spawned_workers_read_the_file(tmp_path):
     path = str(written(tmp_path, "fairway.py", FAIRWAY))
 
@@ -536,28 +520,6 @@ def test_compiled_results_that_differ_from_plain_python_are_a_problem(tmp_path):
         r" look for what differs",
         problems[0],
     )
-
-
-def test_what_is_often_clipped_is_remarked(tmp_path):
-    path = written(
-        tmp_path, "my_sensors.py", SENSORS.replace("r=motion.r", "r=1000.0 * motion.r")
-    )
-    found = check_task("CourseKeeping", sensors=path)
-    assert found.problems == ()
-    (remark,) = found.remarks
-    shown = (
-        r"Observation.helm.(\w+): expected (\S+) to (\S+) in units of its scale, got up"
-        r" to (\S+): it is clipped in (\d+) %"
-    )
-    _, low, high, furthest, part = re.match(shown, remark).groups()
-    assert not float(low) <= float(furthest) <= float(high)
-    assert 50 < float(part) < 100
-
-
-def test_ids_are_texts():
-    for one in (None, 3, ""):
-        with pytest.raises(InputError, match=r"env_id: expected a non-empty string"):
-            register_task(one, "CourseKeeping")
 
 
 def test_ids_are_taken_once(fairway, tmp_path):
