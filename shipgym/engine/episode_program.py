@@ -114,7 +114,8 @@ class EpisodeProgram:
         if name in Outcome._fields or part == "end":
             return rows["outcome"].row(part)
         parts = self.task.reward_names
-        return rows["reward"].first + parts.index(part)
+        number: int = parts.index(part)
+        return rows["reward"].first + number
 
     @cached_property
     def hooks(self) -> dict[str, Any]:

@@ -116,7 +116,8 @@ def push_of(tile: Tile, lane: int) -> Push:
     """Return the accelerations and current of the sea on the ship of a lane now."""
     motion = load_motion(tile.state, lane)
     sea = load_sea(tile.state, lane)
-    return push(motion, sea, load_sea_parameters(tile.ships, lane))
+    pushed: Push = push(motion, sea, load_sea_parameters(tile.ships, lane))
+    return pushed
 
 
 def end_substep(tile: Tile, lane: int, after: Motion, h: float, ship: Ship) -> None:

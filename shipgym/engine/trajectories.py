@@ -96,7 +96,8 @@ def replaced(motion: Motion, psi: float, delta: float, n: float) -> Motion:
 
 def push_now(motion: Motion, sea: Any, parameters: Any) -> Push:
     """Return the accelerations and current of the sea on the ship now."""
-    return push(motion, load_sea(sea), load_sea_parameters(parameters))
+    pushed: Push = push(motion, load_sea(sea), load_sea_parameters(parameters))
+    return pushed
 
 
 def sample_sea(out: Any, sea: Any, rng_state: Any, parameters: Any) -> None:

@@ -287,7 +287,7 @@ def _draw_ship(
     blade = stern - 0.22 * length * _direction(state["psi"] - state["delta"])
     canvas.line(RUDDER, chart.pixels([stern, blade]), 3)
     beam = particulars.get("beam") or USUAL_BEAM * length
-    hull = _hull(*centre, state["psi"], length, beam)
+    hull = _hull(state["x"], state["y"], state["psi"], length, beam)
     canvas.polygon(HULL, chart.pixels(hull))
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -252,34 +252,7 @@ def _often_clipped(task: Task, seen: dict[str, list[float]]) -> Iterator[str]:
             )
 
 
-class RewardDistribution(NamedTuple):
-    """Distribution of rewards under random orders, each held for some intervals."""
-
-    median: float  # of the magnitude of a step's reward
-    rare_share: float  # of all reward in steps of more than `RARE` times the median
-    largest: float  # reward of the largest magnitude
-
-
-def reward_distribution(engine: Engine) -> RewardDistribution:
-    """Distribution of the rewards of an engine's ships under random orders."""
-    rewards = np.concatenate(_random_rewards(engine))
-    size = np.abs(rewards)
-    total = float(size.sum())
-    median = float(np.median(size))
-    is_rare = size > RARE * median
-
-    rare_share = 0.0
-    if total > 0.0:
-        rare_share = float(size[is_rare].sum()) / total
-    largest = size.argmax()
-    return RewardDistribution(
-        median=median,
-        rare_share=rare_share,
-        largest=float(rewards[largest]),
-    )
-
-
-def _random_rewards(engine: Engine) -> list[Floats]:
+def _random_rewards(engine: Engine) -> Floats:
     """Rewards of ships in each step up to their ends, under random orders.
 
     Each order is held for twenty control intervals.
@@ -300,25 +273,27 @@ def _random_rewards(engine: Engine) -> list[Floats]:
         sailing &= ~(terminated | truncated)
         if not sailing.any():
             break
-    return earned
+    return np.concatenate(earned)
 
 
 def _hard_to_learn(engine: Engine) -> Iterator[str]:
     """Remark on rewards of which most lies in rare events, or that hardly differ."""
     most = 0.2  # share of all reward in rare events that learners cope with
     faint = 0.02  # bounded reward that most steps should earn
-    median, rare_share, largest = reward_distribution(engine)
+    rewards = _random_rewards(engine)
+    size = np.abs(rewards)
+    median = float(np.median(size))
+    rare_share = float(size[size > RARE * median].sum() / max(size.sum(), 1e-300))
+    largest = float(rewards[size.argmax()])
     if rare_share > most:
-        expected = f"{100.0 * most:.0f} %"
-        found = f"{100.0 * rare_share:.0f} %"
         remedy = "lower loss_horizon, or give a larger scale as bounded"
         if engine.task.half_reward_cost == 0.0:
             remedy = "leave bounded=True, or lower loss_horizon"
         yield (
-            f"reward: expected at most {expected} of all reward in steps of more than"
-            f" {RARE:g} times the median, {median:.3g}, got {found} under random"
-            f" orders, in one step {largest:.4g}: one event drowns the rest;"
-            f" {remedy}"
+            f"reward: expected at most {100.0 * most:.0f} % of all reward in steps of"
+            f" more than {RARE:g} times the median, {median:.3g}, got"
+            f" {100.0 * rare_share:.0f} % under random orders, in one step"
+            f" {largest:.4g}: one event drowns the rest; {remedy}"
         )
 
     scale = engine.task.half_reward_cost
