@@ -44,17 +44,12 @@ def check_vector_env(
     n_steps : int
         Steps taken in each check, enough for some episodes to end.
     """
-    checks = (
-        _check_spaces,
-        _check_reset,
-        _check_steps,
-        _check_seeds,
-        _check_actions,
-        _check_autoreset,
-    )
-    for check in checks:
-        with closing(make()) as env:
-            check(env, n_steps)
+    with closing(make()) as env:
+        _check_spaces(env)
+        _check_steps(env)
+        _check_seeds(env, n_steps)
+        _check_actions(env)
+        _check_autoreset(env, n_steps)
     if make_single is not None:
         _check_rows(make, make_single, n_steps)
 
@@ -75,52 +70,35 @@ def autoreset_mode(env: Vectors) -> AutoresetMode:
     return mode
 
 
-def _check_spaces(env: Vectors, n_steps: int) -> None:
+def _check_spaces(env: Vectors) -> None:
     autoreset_mode(env)
     n = env.num_envs
     _expect(isinstance(n, int) and n >= 1, f"num_envs: expected >= 1, got {n!r}")
-    _check_batched(
-        "observation",
-        single=env.single_observation_space,
-        batch=env.observation_space,
-        n=n,
-    )
-    _check_batched(
-        "action",
-        single=env.single_action_space,
-        batch=env.action_space,
-        n=n,
-    )
+    for which in ("observation", "action"):
+        single: Space = getattr(env, f"single_{which}_space")
+        batch: Space = getattr(env, f"{which}_space")
+        expected = gymnasium.vector.utils.batch_space(single, n)
+        _expect(
+            batch == expected,
+            f"{which}_space: expected {expected}, that is single_{which}_space batched,"
+            f" got {batch}",
+        )
 
 
-def _check_batched(which: str, single: Space, batch: Space, n: int) -> None:
-    expected = gymnasium.vector.utils.batch_space(single, n)
-    _expect(
-        batch == expected,
-        f"{which}_space: expected {expected}, that is single_{which}_space batched, got"
-        f" {batch}",
-    )
-
-
-def _check_reset(env: Vectors, n_steps: int) -> None:
+def _check_steps(env: Vectors) -> None:
     answer = env.reset(seed=SEED)
     _expect(
         isinstance(answer, tuple) and len(answer) == 2,
         f"reset: expected (observations, infos), got {type(answer)}",
     )
-    observations, infos = answer
-    _check_observations(env, observations, "reset")
-    _check_infos(env, infos, "reset")
-
-
-def _check_steps(env: Vectors, n_steps: int) -> None:
+    _check_observations(env, answer[0], "reset")
+    _check_infos(env, answer[1], "reset")
     env.action_space.seed(SEED)
-    env.reset(seed=SEED)
     kept: list[tuple[Any, Any]] = []
-    for _ in range(min(n_steps, 20)):
-        answer = env.step(env.action_space.sample())
-        _expect(len(answer) == 5, f"step: expected 5 values, got {len(answer)}")
-        observations, rewards, terminated, truncated, infos = answer
+    for _ in range(20):
+        step = env.step(env.action_space.sample())
+        _expect(len(step) == 5, f"step: expected 5 values, got {len(step)}")
+        observations, rewards, terminated, truncated, infos = step
         _check_observations(env, observations, "step")
         _check_array("rewards", rewards, np.floating, env.num_envs)
         _check_array("terminated", terminated, np.bool_, env.num_envs)
@@ -130,7 +108,6 @@ def _check_steps(env: Vectors, n_steps: int) -> None:
             f"step: rewards: expected finite numbers, got {rewards}",
         )
         _check_infos(env, infos, "step")
-
         for before, copy in kept:
             _expect(
                 np.array_equal(before, copy),
@@ -138,6 +115,8 @@ def _check_steps(env: Vectors, n_steps: int) -> None:
             )
         arrays = (observations, rewards, terminated, truncated)
         kept = [(array, np.copy(array)) for array in arrays]
+        if np.any(terminated | truncated):
+            break
 
 
 def _check_array(name: str, array: Any, kind: Any, n: int) -> None:
@@ -220,14 +199,14 @@ def _rollout(env: Vectors, seed: Any, n_steps: int) -> Episode:
 
 
 def _same(one: Episode, other: Episode) -> bool:
-    for step, other_step in zip(one, other, strict=True):
-        for array, other_array in zip(step, other_step, strict=True):
-            if not np.array_equal(array, other_array):
-                return False
-    return True
+    return all(
+        np.array_equal(array, other_array)
+        for step, other_step in zip(one, other, strict=True)
+        for array, other_array in zip(step, other_step, strict=True)
+    )
 
 
-def _check_actions(env: Vectors, n_steps: int) -> None:
+def _check_actions(env: Vectors) -> None:
     env.reset(seed=SEED)
     actions = env.action_space.sample()
     wrong = [np.concatenate([actions, actions])]
