@@ -207,8 +207,16 @@ def _filter(
             misfit = innovation**2 / innovation_variance
             log_likelihood -= 0.5 * (np.log(innovation_variance) + misfit)
         found.append((predicted, predicted_covariance, x, P))
-    arrays = [np.array(column) for column in zip(*found, strict=True)]
-    return _Filtered(*arrays, log_likelihood=float(log_likelihood))
+    before, covariances_before, after, covariances_after = (
+        np.array(column) for column in zip(*found, strict=True)
+    )
+    return _Filtered(
+        predicted=before,
+        predicted_covariances=covariances_before,
+        states=after,
+        covariances=covariances_after,
+        log_likelihood=float(log_likelihood),
+    )
 
 
 def _smoother(motion: Motion, found: _Filtered) -> Floats:
