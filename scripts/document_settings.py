@@ -1,4 +1,4 @@
-"""Write the tables of the environments' pages that name the settings of their tasks.
+"""Write the tables of the pages that name settings of tasks and controllers.
 
 `python scripts/document_settings.py`; a test compares the pages with what this writes.
 """
@@ -6,16 +6,24 @@
 from __future__ import annotations
 
 import re
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from agents.controllers.registry import CLASSICAL, controller_class
 from shipgym.engine.source import keywords
-from shipgym.tasks.definition import TASKS, read_definition
+from shipgym.tasks.definition import read_definition
 
-FOLDER = Path(__file__).parents[1] / "docs" / "environments"
-PAGES = tuple(FOLDER / f"{name}.md" for name in ("course_keeping", "path_following"))
+FOLDER = Path(__file__).parents[1] / "docs"
+NAMES = (
+    "environments/course_keeping",
+    "environments/path_following",
+    "controllers",
+    "preview_lq",
+)
+PAGES = tuple(FOLDER / f"{name}.md" for name in NAMES)
 MARKS = re.compile(
     r"<!-- settings: ([\w-]+) -->\n.*?<!-- end of settings -->", re.DOTALL
 )
@@ -37,6 +45,20 @@ def table(task: str) -> str:
     return "\n".join(lines)
 
 
+def controller_table(kind: str) -> str:
+    """The settings of a controller as Markdown."""
+    lines = ["| setting | default | bounds | meaning |", "| --- | --- | --- | --- |"]
+    settings = controller_class(kind).settings_type
+    assert settings is not None
+    for one in fields(settings):
+        about = one.metadata
+        bounds = [f"{SIGNS[key]} {value:g}" for key, value in about["bounds"].items()]
+        default = "" if one.default is None else f"{one.default:g}"
+        bounded = ", ".join(bounds)
+        lines.append(f"| `{one.name}` | {default} | {bounded} | {about['meaning']} |")
+    return "\n".join(lines)
+
+
 def _shown(default: Any) -> str:
     if isinstance(default, np.ndarray):
         return "`None`"
@@ -47,15 +69,13 @@ def page(text: str) -> str:
     """A page with its tables made anew."""
 
     def written(found: re.Match[str]) -> str:
-        return (
-            f"<!-- settings: {found[1]} -->\n{table(found[1])}\n<!-- end of"
-            " settings -->"
-        )
+        name = found[1]
+        rows = controller_table(name) if name in CLASSICAL else table(name)
+        return f"<!-- settings: {name} -->\n{rows}\n<!-- end of settings -->"
 
     return MARKS.sub(written, text)
 
 
 if __name__ == "__main__":
-    assert len(PAGES) == len(TASKS)
     for path in PAGES:
         path.write_text(page(path.read_text(encoding="utf-8")), encoding="utf-8")

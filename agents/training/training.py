@@ -23,25 +23,20 @@ from agents.training import run_folder
 from agents.training.evaluation import HeldOut, TrainingProgress, TrainingResult
 from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS, TrainingPlan
 from shipgym.errors import InputError
-from shipgym.extras import library
 from shipgym.files import read_bytes, write_bytes, write_json
 
-library("stable_baselines3", "rl", "training needs it")
+try:
+    import torch
+    from stable_baselines3.common.callbacks import BaseCallback
+    from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
+    from stable_baselines3.common.save_util import recursive_getattr
+    from stable_baselines3.common.utils import set_random_seed
 
-import torch  # noqa: E402 - behind the word on what is missing
-from stable_baselines3.common.callbacks import BaseCallback  # noqa: E402
-from stable_baselines3.common.logger import (  # noqa: E402
-    Logger,
-    TensorBoardOutputFormat,
-)
-from stable_baselines3.common.save_util import recursive_getattr  # noqa: E402
-from stable_baselines3.common.utils import set_random_seed  # noqa: E402
-
-from agents.training.algorithms import (  # noqa: E402
-    design_base,
-    make_agent,
-    set_deviation,
-)
+    from agents.training.algorithms import design_base, make_agent, set_deviation
+except ModuleNotFoundError as error:
+    raise InputError(
+        f"{error.name} is not installed, training needs it: pip install 'shipgym[rl]'"
+    ) from None
 
 LARGEST_CHECKPOINT = 2_000_000_000  # bytes
 #: Arrays of a replay buffer.

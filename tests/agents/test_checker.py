@@ -7,7 +7,7 @@ import pytest
 from agents import LQ, LQG, PID, check_controller
 from shipgym.errors import InputError
 from shipgym.models import load_model
-from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
+from shipgym.tasks.scales import OBSERVATION_NAMES
 from shipgym.tasks.task import path_following_task
 
 MARINER = load_model("mariner")
@@ -167,51 +167,3 @@ def test_a_user_s_own_passes():
 def test_a_broken_promise_is_named(controller, message):
     with pytest.raises(InputError, match=message):
         check_controller(controller, MARINER)
-
-
-def test_a_scale_of_one_s_own_may_differ_by_a_millionth_of_it():
-    """Also where it is far from 1, as that of the yaw rate, 0.048 rad/s, is."""
-    scales = observation_scales(MARINER)
-    for factor, fits in ((1.0 + 0.9e-6, True), (1.0 + 1.2e-6, False)):
-        own = Helmsman()
-        own.observation_names = OBSERVATION_NAMES
-        own.observation_scales = tuple(
-            scales * np.where(np.arange(8) == 2, factor, 1.0)
-        )
-        if fits:
-            check_controller(own, MARINER, n_steps=2)
-        else:
-            with pytest.raises(InputError, match="scale of 'yaw_rate': expected"):
-                check_controller(own, MARINER, n_steps=2)
-
-
-@pytest.mark.parametrize(("more", "passes"), [(0.95e-5, True), (1.05e-5, False)])
-def test_orders_are_the_same_to_a_hundred_thousandth_of_the_rudder_limit(more, passes):
-    class Nearly(Helmsman):
-        """A single ship's rudder is a little more than that of many."""
-
-        def answer(self, seen, state):
-            return np.full((*seen.shape[:-1], 1), 0.5 + more * (seen.ndim == 1)), state
-
-    if passes:
-        check_controller(Nearly(), MARINER, n_steps=2)
-    else:
-        with pytest.raises(InputError, match=r"ship 0 alone: expected \[0\.5\]"):
-            check_controller(Nearly(), MARINER, n_steps=2)
-
-
-def test_by_default_a_minute_of_intervals_is_steered():
-    """What it remembers is how many it has seen; the first of another episode comes
-    after them."""
-
-    class Counter(Helmsman):
-        most = 0
-
-        def answer(self, seen, state):
-            counted = (0 if state is None else state) + 1
-            self.most = max(self.most, counted)
-            return 0.0 * seen[..., :1], counted
-
-    counter = Counter()
-    check_controller(counter, MARINER)
-    assert counter.most == 61

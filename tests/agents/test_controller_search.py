@@ -12,13 +12,10 @@ from agents import PID
 from agents.controllers.designs import design, tuned
 from agents.controllers.registry import CLASSICAL
 from agents.suites.suite import BenchmarkTask, load_suite, load_tuned
-from agents.training.algorithms import design_base
 from agents.training.controller_search import (
     SearchBudget,
-    episodes_of,
     has_margin,
     search,
-    settings_at,
     simplified,
     tune_controller,
     unseen_episodes,
@@ -55,12 +52,6 @@ def test_it_finds_the_bottom_of_a_bowl_within_its_budget() -> None:
     assert search(bowl, BOWL, SearchBudget(evaluations=300)) == found
 
 
-def test_settings_stay_within_their_bounds() -> None:
-    far = settings_at(np.array([100.0, -100.0]), BOWL)
-    assert far == {"a": pytest.approx(100.0), "b": -1.0}
-    assert settings_at(np.zeros(2), BOWL) == {"a": 1.0, "b": 0.0}
-
-
 def test_a_search_is_reproducible_and_not_worse_than_the_design() -> None:
     budget = SearchBudget(evaluations=30, episodes=4)
     first, second = (tune_controller("pid", NOISY, budget) for _ in range(2))
@@ -82,22 +73,6 @@ def test_what_a_model_says_nothing_of_is_put_back_to_the_design() -> None:
     plain, plain_cost = simplified(found, cost, far_sighted, episodes)
     assert plain == start
     assert plain_cost == pytest.approx(cost, rel=1e-3)
-
-
-def test_episodes_of_a_search_are_exchanged_and_others_judge() -> None:
-    sets = [set(episodes_of(16, number)) for number in range(5)]
-    assert sets[4] == sets[0]
-    searched = set.union(*sets)
-    assert len(searched) == 64
-    assert searched.isdisjoint(unseen_episodes("pid", NOISY, 16).seeds)
-
-
-@pytest.mark.parametrize(
-    ("name", "value"), [("seconds", 0.0), ("evaluations", 0), ("episodes", 0)]
-)
-def test_a_budget_of_nothing_is_refused(name: str, value: float) -> None:
-    with pytest.raises(InputError, match=rf"^{name}: expected"):
-        SearchBudget(**{name: value})  # type: ignore[arg-type]
 
 
 def test_a_loop_with_little_margin_is_refused() -> None:
@@ -146,24 +121,6 @@ def test_settings_found_are_read_from_the_file_of_the_suite(
         InputError, match=r"task of suite 'any' with tuned controllers, got 'noisy'"
     ):
         tuned("best", NOISY, "any")
-
-
-def test_policies_are_not_added_to_slow_controllers_unless_asked_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "tuned.json"
-    monkeypatch.setattr("agents.suites.suite.suite_file", lambda suite, what: path)
-    costs = {"mpc": 1.0, "lq": 3.0, "pid": 4.0}
-    found = {kind: {"settings": {}, "cost": cost} for kind, cost in costs.items()}
-    write_json({"tasks": {"calm": found}}, path)
-    base = design_base("tuned", replace(CALM, suite="shipgym-v1"))
-    assert getattr(base, "kind", None) == "lq"
-    del found["lq"], found["pid"]
-    write_json({"tasks": {"calm": found}}, path)
-    with pytest.raises(
-        InputError, match="for task 'calm' of suite 'any', 'mpc', got 'base'"
-    ):
-        tuned("base", CALM, "any")
 
 
 def test_the_suite_s_settings_make_sane_controllers_for_every_task() -> None:

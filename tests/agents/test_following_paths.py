@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID
-from shipgym import InputError, load_model
+from shipgym import load_model
 
 
 def sailed(controller, model, n=64, **options):
@@ -63,25 +63,3 @@ def test_a_ship_left_to_herself_runs_aground():
     success, grounded, _ = sailed(Nothing(**vars(PID.from_model(model))), model)
     assert success < 0.05
     assert grounded > 0.9
-
-
-def test_what_is_seen_beyond_does_not_matter_but_must_begin_as_designed_for():
-    model = load_model("mariner")
-    pid = PID.from_model(model)
-    random = np.random.default_rng(0)
-    seen = random.uniform(-1.0, 1.0, (5, 13))
-    np.testing.assert_array_equal(pid.predict(seen)[0], pid.predict(seen[:, :8])[0])
-    with pytest.raises(
-        InputError, match=r"observation: expected shape .* got \(5, 7\)"
-    ):
-        pid.predict(seen[:, :7])
-    names, scales = list(pid.observation_names), list(pid.observation_scales)
-    pid.check_fits([*names, "cross_track"], [*scales, 1.0])
-    with pytest.raises(
-        InputError, match="0: expected 'heading_error_sin', got 'cross_track'"
-    ):
-        pid.check_fits(["cross_track", *names], [1.0, *scales])
-    with pytest.raises(
-        InputError, match="in one and not in the other: heading_error_integral"
-    ):
-        pid.check_fits(names[:7], scales[:7])

@@ -118,9 +118,3 @@ def test_course_keeping_and_another_corridor_are_refused():
         IntegralLineOfSight.from_model(
             MARINER, task=course_keeping_task(), lookahead_lengths=2.0
         )
-
-
-@pytest.mark.parametrize("name", ["lookahead_lengths", "integral_lengths"])
-def test_numbers_beyond_their_bounds_are_refused(name):
-    with pytest.raises(InputError, match=f"^{name}: .*expected a number > 0"):
-        IntegralLineOfSight.from_model(MARINER, **{name: 0.0})

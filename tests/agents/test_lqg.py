@@ -5,19 +5,15 @@ from dataclasses import replace
 import control
 import numpy as np
 import pytest
-from scipy.stats import norm
 
 from agents import LQ, LQG, load_agent, sail, step_response
 from agents.controllers.kalman import kalman_gain, rudder_response, wave_model
-from agents.controllers.law import Signals
 from agents.controllers.linear_loop import sample_ship
-from agents.controllers.memory import from_columns
 from shipgym.errors import InputError
 from shipgym.models.linear import nomoto, straight_running
 from shipgym.ships.steering import SteeringGear
 from shipgym.tasks.scales import control_interval
 from shipgym.tasks.task import course_keeping_task
-from shipgym.trials.sensors import SEA_TRIAL
 from tests.agents.mariners import MARINER, changed
 from tests.ships.nomoto import nomoto2_ship
 
@@ -74,22 +70,6 @@ def test_the_wave_model_keeps_its_deviation_and_period():
     assert wave_model(9.0, 0.02, swing)[0] == pytest.approx(
         0.5318 * np.eye(2), abs=1e-4
     )
-
-
-def test_noise_makes_a_new_course_once_in_years():
-    """Six deviations of the innovation, whose covariance is (1 - C K)^-1 R."""
-    lqg = LQG.from_model(MARINER, noise=3.0)
-    noise = np.diag(
-        (3.0 * np.array([SEA_TRIAL["r"].noise, SEA_TRIAL["psi"].noise])) ** 2
-    )
-    deviation = np.sqrt(
-        np.linalg.solve(np.eye(2) - lqg.output @ lqg.kalman, noise)[1, 1]
-    )
-    chance = 2.0 * norm.sf(lqg.design["new_course_rad"] / deviation)
-    assert 10.0 < 1.0 / (chance * 365.25 * 86400.0) < 20.0
-    assert LQG.from_model(MARINER).design["new_course_rad"] == pytest.approx(
-        np.radians(1.0)
-    )  # at least
 
 
 def gain_at(controller, period):
@@ -171,22 +151,10 @@ def test_the_file_holds_the_filter(tmp_path):
         load_agent(tmp_path / "cut.json")
 
 
-def test_the_state_is_that_of_as_many_ships():
-    lqg = LQG.from_model(MARINER)
-    _, state = lqg.predict(np.zeros((3, 8)))
-    with pytest.raises(
-        InputError, match=rf"state: expected shape \(2, {state.shape[1]}\)"
-    ):
-        lqg.predict(np.zeros((2, 8)), state)
-
-
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
         ("wave_period", 1.0, "expected a number > 2 \\(two control intervals"),
-        ("noise", 0.0, "expected a number > 0"),
-        ("wave_heading_deg", 0.0, "expected a number > 0"),
-        ("disturbance_deg", 0.0, "expected a number > 0"),
         ("rudder_weight", -1.0, "expected a number > 0"),
     ],
 )
@@ -194,27 +162,3 @@ def test_numbers_beyond_their_bounds_are_refused(name, value, message):
     settings = {"wave_period": 9.0, name: value}
     with pytest.raises(InputError, match=f"^{name}: .*{message}"):
         LQG.from_model(MARINER, **settings)
-
-
-def test_a_heading_opposite_to_the_course_is_estimated_as_any_other():
-    """Through 180 degrees of error, where the measured one changes its sign."""
-    lqg, kept = LQG.from_model(MARINER), []
-    noise = 1e-3 * np.random.default_rng(0).normal(size=12)
-    still = Signals(0.0, -0.002, 0.0, 0.01, 0.0, 0.0)
-    for course in (0.0, np.pi - 0.012):
-        memory = from_columns(lqg.memory_record, iter(np.zeros(lqg.memory_size)))
-        estimates = []
-        for k in range(12):
-            error = course + 0.002 * k + noise[k]
-            shown = np.arctan2(np.sin(error), np.cos(error))
-            _, memory = lqg.steer(still._replace(heading_error=shown), memory)
-            motions = memory.motions
-            estimates.append([motions.sway, motions.yaw_rate, motions.heading_error])
-        kept.append(np.array(estimates))
-
-    np.testing.assert_allclose(kept[1][:, :2], kept[0][:, :2], rtol=1e-9, atol=1e-12)
-    turned = kept[1][:, 2] - kept[0][:, 2]
-    opposite = np.exp(1j * (np.pi - 0.012))
-    np.testing.assert_allclose(np.exp(1j * turned), opposite, atol=1e-12)
-    assert np.abs(kept[1][:, 2]).max() <= np.pi
-    assert kept[1][0, 2] > 0.0 > kept[1][-1, 2]

@@ -44,15 +44,6 @@ def test_a_ship_on_the_arc_is_on_the_path_and_beyond_it_on_the_next_leg(side):
     assert place.turns.next_distance[0] == FAR
 
 
-@pytest.mark.parametrize(("x", "opposite"), [(90.0, 0.0), (102.0, 2.0), (110.0, 10.0)])
-def test_far_inside_of_an_arc_the_way_stays_finite_and_forward(x, opposite):
-    """A ship beyond the middle of the circle, where all directions would be the arc."""
-    ahead = PathAhead(turns(100.0, 1.0, 9e3, 0.5), 300.0)
-    along = ahead.fix(np.array([x]), np.array([320.0])).along_track[0]
-    expected = x if x < 100.0 else 100.0 + 300.0 * np.arctan(opposite / 30.0)
-    assert along == pytest.approx(expected)
-
-
 def mirrored(observation):
     """The same to the other side."""
     odd = {
@@ -121,20 +112,3 @@ def test_it_simulates_lq_and_no_other_autopilot():
     with pytest.raises(InputError, match="autopilot: expected LQ, got PID"):
         MPC.from_model(MARINER, autopilot=PID.from_model(MARINER))
     assert isinstance(MPC.from_model(MARINER).autopilot, LQ)
-
-
-def test_it_looks_one_step_of_two_intervals_ahead_at_least():
-    design = MPC.from_model(MARINER, horizon_lengths=0.01).design
-    assert design["horizon_steps"] == 1.0
-    longer = MPC.from_model(MARINER, horizon_lengths=3.0).design
-    time = 3.0 * MARINER.travel_time
-    assert longer["horizon_steps"] == round(time / (2.0 * longer["dt"]))
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("horizon_lengths", 0.0), ("horizon_lengths", 41.0), ("deviation_deg", 61.0)],
-)
-def test_numbers_beyond_their_bounds_are_refused(name, value):
-    with pytest.raises(InputError, match=f"^{name}: .*expected a number > 0"):
-        MPC.from_model(MARINER, **{name: value})

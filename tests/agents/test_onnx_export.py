@@ -1,7 +1,6 @@
 """The ONNX graph commands what the policy does, for any number of ships."""
 
 import json
-import sys
 
 import numpy as np
 import onnxruntime
@@ -11,7 +10,6 @@ from typer.testing import CliRunner
 from agents import LQ
 from agents.cli import app
 from agents.policies.onnx_export import onnx_model
-from shipgym.errors import InputError
 from tests.agents.policies import MARINER, random_network, random_policy
 
 LQ_MARINER = LQ.from_model(MARINER)
@@ -25,7 +23,6 @@ POLICIES = {
     "frame_stack": random_policy(frame_stack=3),
     "residual": random_policy(base=LQ_MARINER, authority=0.6, frame_stack=2),
 }
-HELD = random_policy(base=LQ_MARINER, authority=0.6, action_repeat=2)
 
 
 def opened(policy):
@@ -52,20 +49,6 @@ def test_the_graph_commands_what_the_policy_does(name):
             np.testing.assert_allclose(action, expected, rtol=0.0, atol=1e-6)
 
 
-def test_between_decisions_the_part_of_the_last_one_is_added_to_the_base():
-    session = opened(HELD)
-    repeat = json.loads(session.get_modelmeta().custom_metadata_map["action_repeat"])
-    random, state, part = np.random.default_rng(0), None, None
-    for step in range(5):
-        seen = random.uniform(-1.0, 1.0, (3, 8)).astype(np.float32)
-        expected, state = HELD.predict(seen, state, np.full(3, step == 0))
-        base = LQ_MARINER.predict(seen)[0]
-        if step % repeat == 0:
-            (part,) = session.run(["part"], {"observations": seen, "base_action": base})
-        action = np.clip(base + part, -1.0, 1.0)
-        np.testing.assert_allclose(action, expected, rtol=0.0, atol=1e-6)
-
-
 def test_the_metadata_say_what_it_observes():
     policy = POLICIES["residual"]
     texts = opened(policy).get_modelmeta().custom_metadata_map
@@ -80,13 +63,6 @@ def test_the_metadata_say_what_it_observes():
     assert not found.keys() & {"training", "network", "format", "kind"}
 
 
-def test_what_runs_on_ships_need_not_be_new():
-    """Runtimes of 2022 read the operators of opset 17 in files of version 8."""
-    model = onnx_model(HELD)
-    assert [(one.domain, one.version) for one in model.opset_import] == [("", 17)]
-    assert (model.ir_version, model.producer_name) == (8, "shipgym")
-
-
 def test_the_command_writes_it(tmp_path):
     POLICIES["relu"].save(tmp_path / "ppo.json")
     LQ_MARINER.save(tmp_path / "lq.json")
@@ -96,14 +72,3 @@ def test_the_command_writes_it(tmp_path):
         assert result.exit_code == exit_code, result.output
     assert (tmp_path / "ppo.onnx").stat().st_size < 10_000
     assert not (tmp_path / "lq.onnx").exists()
-
-
-def test_what_is_no_network_is_refused():
-    with pytest.raises(InputError, match="policy: expected a learned policy, got LQ"):
-        onnx_model(LQ_MARINER)
-
-
-def test_without_onnx_the_extra_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "onnx", None)
-    with pytest.raises(InputError, match=r"pip install 'shipgym\[onnx\]'"):
-        onnx_model(POLICIES["relu"])

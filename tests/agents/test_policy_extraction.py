@@ -5,16 +5,13 @@ from copy import deepcopy
 import numpy as np
 import pytest
 import torch
-from gymnasium.spaces import Box
-from gymnasium.wrappers import RescaleObservation
 from sb3_contrib import TQC
-from stable_baselines3 import A2C, DQN, PPO, SAC, TD3
+from stable_baselines3 import DQN, PPO, SAC, TD3
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecFrameStack, VecNormalize
 
 from agents import LQ, LearnedPolicy, load_agent
 from agents.policies.policy import order_numbers
-from agents.policies.policy_extraction import actor_network
 from agents.training.residual import ResidualVecEnv
 from shipgym import ShipVecEnv
 from shipgym.errors import InputError
@@ -32,7 +29,6 @@ REPLAY = {
 }
 AGENTS = {
     "PPO": (PPO, {**ROLLOUT, "batch_size": 32}),
-    "A2C": (A2C, {"n_steps": 8, "policy_kwargs": NETS}),
     "SAC": (SAC, REPLAY),
     "TD3": (TD3, REPLAY),
     "TQC": (TQC, REPLAY),
@@ -100,15 +96,6 @@ def test_discrete_orders_are_those_of_torch():
     assert policy.env_id == "shipgym/CourseKeepingDiscrete-v0"
 
 
-def test_rudder_and_shaft_are_those_of_torch():
-    env = ships("shipgym/PathFollowingShaft-v0", model="kvlcc2")
-    agent = strong(PPO("MlpPolicy", env, n_steps=8, batch_size=32))
-    policy = LearnedPolicy.from_sb3(agent)
-    expected, _ = agent.predict(seen(agent), deterministic=True)
-    same_commands(policy, seen(agent), expected)
-    policy.check_fits_model(load_model("kvlcc2"))
-
-
 def test_what_it_learned_in_is_recorded():
     env = ships(
         "shipgym/PathFollowing-v0", sea="moderate", leg_lengths=(5.0, 9.0), threads=1
@@ -121,32 +108,6 @@ def test_what_it_learned_in_is_recorded():
     assert policy.observation_names[-1] == "second_turn_angle"
     assert policy.model_name == "mariner"
     policy.check_fits_model(MARINER)
-
-
-@pytest.mark.parametrize("history", [1, 3])
-def test_with_base_and_history_it_steers_as_in_training(history):
-    """Step by step what the agent commands through the wrapper, over the ends of
-    episodes."""
-    base = LQ.from_model(MARINER)
-    options = {"episode_steps": 15, "action": "rudder"}
-    env = ResidualVecEnv(ships(**options), base, authority=0.5, frame_stack=history)
-    agent = strong(
-        PPO("MlpPolicy", env, n_steps=8, batch_size=32, policy_kwargs=dict(NETS))
-    )
-    policy = LearnedPolicy.from_sb3(agent)
-    assert (policy.frame_stack, policy.base, policy.authority) == (history, base, 0.5)
-    bare = ships(**options)
-    theirs, ours = env.reset(), bare.reset()
-    state, starts = None, np.ones(4, bool)
-    for step in range(40):
-        action, state = policy.predict(ours, state, starts)
-        output, _ = agent.predict(theirs, deterministic=True)
-        ours, rewards, starts, _ = bare.step(action)
-        theirs, expected, _, _ = env.step(output)
-        np.testing.assert_allclose(
-            rewards, expected, rtol=0.0, atol=1e-4, err_msg=f"step {step}"
-        )
-        np.testing.assert_allclose(ours, theirs[:, -9:-1], rtol=0.0, atol=1e-4)
 
 
 class Doubled(BaseFeaturesExtractor):
@@ -219,45 +180,6 @@ def test_what_a_policy_cannot_be_is_refused(name):
         LearnedPolicy.from_sb3(make())
 
 
-def test_layers_that_are_not_dense_are_refused_by_name():
-    weights = {"value_net.weight": torch.ones(1, 2)}
-    for name, shape in (
-        ("mlp_extractor.policy_net.0", (2, 3)),
-        ("mlp_extractor.policy_net.2", (2, 2)),
-        ("action_net", (1, 2)),
-    ):
-        weights[f"{name}.weight"] = torch.ones(shape)
-        weights[f"{name}.bias"] = torch.zeros(shape[0])
-    network = actor_network(weights, None, "mine")
-    assert network.sizes == (3, 2, 2, 1)
-    assert (network.activation, network.output) == ("tanh", "linear")
-
-    with pytest.raises(InputError, match=r"missing or unknown: 'norm.weight'"):
-        actor_network({**weights, "norm.weight": torch.ones(2)}, None, "mine")
-    del weights["action_net.bias"]
-    with pytest.raises(InputError, match=r"missing or unknown: 'action_net.bias'"):
-        actor_network(weights, None, "mine")
-
-
-def test_an_agent_that_commands_otherwise_than_its_layers_is_refused(monkeypatch):
-    agent = PPO("MlpPolicy", ships(), **QUICK)
-    predict = agent.predict
-
-    def shifted(offset):
-        def commands(observations, **more):
-            return predict(observations, **more)[0] + offset, None
-
-        monkeypatch.setattr(agent, "predict", commands)
-        return agent
-
-    LearnedPolicy.from_sb3(shifted(0.9e-4))
-    with pytest.raises(InputError, match="commands otherwise than its layers"):
-        LearnedPolicy.from_sb3(shifted(-1.05e-4))
-    agent.observation_space = Box(-1.0, 1.0, (9,))
-    with pytest.raises(InputError, match=r"of shape \(8,\), .* got \(9,\)"):
-        LearnedPolicy.from_sb3(agent)
-
-
 def test_settings_of_the_wrapper_are_those_of_the_policy():
     base = LQ.from_model(MARINER)
     settings = {"frame_stack": 2, "action_repeat": 3, "rate_limit": 1.0}
@@ -266,16 +188,3 @@ def test_settings_of_the_wrapper_are_those_of_the_policy():
         policy = LearnedPolicy.from_sb3(PPO("MlpPolicy", env, **QUICK))
         assert (policy.base, policy.authority) == (own, authority)
         assert settings.items() <= vars(policy).items()
-
-
-def test_single_environments_are_known_too():
-    import gymnasium
-
-    agent = PPO("MlpPolicy", gymnasium.make(COURSE, model="mariner", dt=2.0), **QUICK)
-    policy = LearnedPolicy.from_sb3(agent)
-    assert policy.env_options == {"dt": 2.0}
-    wrapped = RescaleObservation(
-        gymnasium.make(COURSE, model="mariner"), np.float32(-9), np.float32(9)
-    )
-    with pytest.raises(InputError, match="got RescaleObservation"):
-        LearnedPolicy.from_sb3(PPO("MlpPolicy", wrapped, **QUICK))

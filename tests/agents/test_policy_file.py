@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from safetensors.numpy import load_file, save_file
 
-from agents import PID, check_controller, load_agent
+from agents import PID, load_agent
 from shipgym.errors import InputError
-from shipgym.models.catalogue import mariner
 from shipgym.sea import Current, Weather
 from tests.agents.policies import MARINER, random_policy
 
@@ -79,19 +78,11 @@ def test_what_was_recorded_comes_back(tmp_path):
     assert again.model_name == "mariner"
 
 
-def test_files_may_be_renamed_together(tmp_path):
-    random_policy().save(tmp_path / "a.json")
-    for end in ("json", "safetensors"):
-        (tmp_path / f"a.{end}").rename(tmp_path / f"b.{end}")
-    again = load_agent(tmp_path / "b.json")
-    np.testing.assert_array_equal(steered(again), steered(random_policy()))
-
-
 def test_no_torch_is_needed(tmp_path):
     POLICIES["residual"].save(tmp_path / "agent.json")
     code = (
         "import sys; import numpy as np\n"
-        "from agents import load_agent; from shipgym.ships import load_model\n"
+        "from agents import load_agent; from shipgym import load_model\n"
         "agent = load_agent(sys.argv[1], load_model('mariner'))\n"
         "agent.predict(np.zeros(8, np.float32))\n"
         "assert not {'torch', 'stable_baselines3', 'onnx'} & set(sys.modules)"
@@ -220,28 +211,3 @@ def test_a_file_cut_short_or_missing_is_refused(end, saved):
     cut.unlink()
     with pytest.raises(InputError, match=f"agent.{end}: there is no such"):
         load_agent(saved)
-
-
-def test_what_is_no_safetensors_file_is_refused_though_its_hash_is_right(saved):
-    saved.with_suffix(".safetensors").write_bytes(b"pickle")
-    edited(saved, "weights__sha256", hashlib.sha256(b"pickle").hexdigest())
-    with pytest.raises(InputError, match="expected a safetensors file"):
-        load_agent(saved)
-
-
-@pytest.mark.parametrize("name", ["plain", "residual"])
-def test_a_policy_of_another_ship_is_refused_with_the_difference(name, tmp_path):
-    POLICIES[name].save(tmp_path / "agent.json")
-    message = r"scale of 'yaw_rate': expected 0\.0479.* got 0\.0248"
-    with pytest.raises(InputError, match=f"model 'mariner': {message}"):
-        load_agent(tmp_path / "agent.json", mariner(service_speed=4.0))
-
-
-def test_what_is_loaded_passes_the_conformance_suite(tmp_path):
-    POLICIES["residual"].save(tmp_path / "agent.json")
-    check_controller(load_agent(tmp_path / "agent.json"), MARINER, n_steps=5)
-
-
-def test_a_run_s_folder_names_its_agent(saved):
-    again = load_agent(saved.parent)
-    np.testing.assert_array_equal(steered(again), steered(POLICIES["plain"]))

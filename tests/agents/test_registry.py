@@ -74,22 +74,6 @@ class Sluggish(LQ):
         return order, LastOrder(order)
 
 
-def test_what_a_controller_of_ones_own_remembers_is_a_record_with_names():
-    """Another controller's memory is refused."""
-    ship = load_model("mariner")
-    lq, sluggish = LQ.from_model(ship), Sluggish.from_model(ship)
-    check_controller(sluggish, ship, n_steps=4)
-    seen = np.zeros((2, 8), np.float32)
-    seen[:, 0], seen[:, 1] = np.sin(0.1), np.cos(0.1)
-    first, state = sluggish.predict(seen)
-    second, state = sluggish.predict(seen, state)
-    plain, _ = lq.predict(seen)
-    assert state.shape == (2, sluggish.memory_size) == (2, 1)
-    np.testing.assert_allclose([first, second], [0.5 * plain, 0.75 * plain], rtol=1e-6)
-    with pytest.raises(InputError, match=r"state: expected shape \(2, 1\)"):
-        sluggish.predict(seen, np.zeros((2, 3)))
-
-
 def test_a_controller_of_ones_own_is_one_file(mine, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     import my_controllers

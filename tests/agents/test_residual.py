@@ -130,27 +130,6 @@ class Steady:
         return np.full((2, 1), 0.9), len(self.asked)
 
 
-def test_without_a_base_outputs_are_limited_in_rate_from_nothing_on():
-    inner = Counting(end=2)
-    limited = ResidualVecEnv(inner, rate_limit=0.25)
-    limited.reset()
-    for output in (1.0, 1.0, 5.0):
-        limited.step(np.full((2, 1), output))
-    assert inner.commanded == [
-        [[0.25], [0.25]],
-        [[0.5], [0.5]],
-        [[0.75], [0.25]],
-    ]  # row 1 began anew
-
-
-def test_without_limit_and_base_outputs_are_handed_on_as_they_are():
-    inner = Counting(commands=2)
-    plain = ResidualVecEnv(inner, frame_stack=2)
-    plain.reset()
-    plain.step(np.array([[3.0, -2.0], [0.5, 0.0]]))
-    assert inner.commanded == [[[3.0, -2.0], [0.5, 0.0]]]
-
-
 def test_the_base_and_what_is_added_are_no_more_than_the_whole_range():
     inner, base = Counting(), Steady()
     residual = ResidualVecEnv(inner, base, authority=0.5)

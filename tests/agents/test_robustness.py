@@ -40,8 +40,3 @@ def test_quantiles_are_over_the_stable_loops():
     assert many.quantiles()["gain_margin"].tolist() == [5.0, 50.0, 95.0]
     with pytest.raises(InputError, match="expected a stable loop on at least one ship"):
         replace(found, stable=~every[:4]).quantiles()
-
-
-def test_no_models_are_refused():
-    with pytest.raises(InputError, match="models: expected at least one"):
-        margin_uncertainty(LQ.from_model(MARINER), [])

@@ -84,44 +84,9 @@ def test_it_is_the_current_on_legs_and_on_arcs(north, east, angle, sway):
     assert abs(course) == pytest.approx(abs(angle), abs=0.1)  # the turn was sailed
 
 
-def test_beyond_sight_the_speed_is_taken_to_be_that_through_the_water():
-    near_sighted = AT_ONCE._replace(sight=100.0)
-    memory = NOTHING
-    for seen, _ in Drifting(0.5, np.array([1.5, 1.0])).sailed(20):
-        memory = seen_current(seen, memory, near_sighted)
-    assert (memory.ahead, memory.is_known) == (0.0, 0.0)
-    assert memory.aside == pytest.approx(1.0, abs=0.3)
-
-
 def test_on_the_last_leg_the_end_of_the_path_comes_closer():
     current = np.array([1.0, 0.5])
     memory = NOTHING
     for seen, _ in Drifting(0.0, current).sailed(20):
         memory = seen_current(seen, memory, AT_ONCE)
     assert (memory.ahead, memory.aside) == pytest.approx((1.0, 0.5), abs=0.01)
-
-
-def test_a_low_pass_takes_up_a_share_of_what_is_new():
-    slow = AT_ONCE._replace(update=0.1)
-    current = np.array([0.0, 1.0])
-    signals = [seen for seen, _ in Drifting(0.5, current).sailed(4)]
-    memory = NOTHING
-    for seen in signals:
-        memory = seen_current(seen, memory, slow)
-    calm = seen_current(
-        signals[-1]._replace(drift=np.zeros(1), heading_error=np.zeros(1)),
-        memory,
-        slow,
-    )
-    assert memory.aside == pytest.approx(1.0, abs=0.01)
-    assert calm.aside == pytest.approx(0.9, abs=0.1)
-
-
-def test_what_no_ship_does_is_not_believed():
-    signals = [seen for seen, _ in Drifting(0.5, np.zeros(2)).sailed(3)]
-    memory = NOTHING
-    for seen in signals:
-        memory = seen_current(seen, memory, AT_ONCE)
-    turns = signals[-1].turns._replace(next_distance=np.array([10.0]))
-    leaping = signals[-1]._replace(turns=turns)
-    assert seen_current(leaping, memory, AT_ONCE).ahead == pytest.approx(0.0, abs=0.01)

@@ -4,27 +4,15 @@ import numpy as np
 import pytest
 
 from agents import LQ, IntegralLineOfSight, WheelOver, check_controller, load_agent
-from agents.controllers.guided import bend
-from agents.controllers.law import Turns
 from agents.controllers.wheel_over import own_lead
 from agents.rollouts.rollout import episode_costs
 from shipgym.envs.engine import Engine
-from shipgym.errors import InputError
 from shipgym.models.linear import straight_running
 from shipgym.sea import Current, Weather
 from shipgym.tasks.task import path_following_task
 from tests.agents.mariners import MARINER
 
 LENGTH, SPEED = MARINER.particulars["length"], MARINER.particulars["speed"]
-
-
-@pytest.mark.parametrize(
-    ("distance", "course"),
-    [(100.0, 0.0), (150.0, -0.25), (300.0, -1.0), (600.0, -0.5), (900.0, -0.5)],
-)
-def test_the_course_of_a_path_bends_by_its_arcs(distance, course):
-    ahead = Turns(100.0, -1.0, 500.0, 0.5)
-    assert bend(distance, ahead, 200.0) == pytest.approx(course)
 
 
 def test_an_arc_is_seen_ahead_by_the_lag_and_a_quarter_of_a_length():
@@ -63,12 +51,3 @@ def test_it_is_a_controller_and_a_file(tmp_path):
     guide.save(tmp_path / "guide.json")
     again = load_agent(tmp_path / "guide.json", MARINER)
     assert (again.kind, again.gains) == ("wheel-over", guide.gains)
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("lookahead_lengths", 0.0), ("reach_lengths", 0.0), ("crab_share", 3.0)],
-)
-def test_numbers_beyond_their_bounds_are_refused(name, value):
-    with pytest.raises(InputError, match=f"^{name}: .*expected a number"):
-        WheelOver.from_model(MARINER, **{name: value})
