@@ -7,9 +7,8 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
-from shipgym.trials.conventions import Conventions
+from shipgym.trials.conventions import AS_LOGGED, Conventions, Installation
 from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.installation import AS_LOGGED, Installation
 from shipgym.trials.instrument_offsets import DISTINCT_COURSES, correct_offsets
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.resampling import Log

@@ -25,9 +25,8 @@ from shipgym.checks import (
 from shipgym.errors import InputError
 from shipgym.files import write_text
 from shipgym.trials.columns import parse_columns
-from shipgym.trials.conventions import Conventions
+from shipgym.trials.conventions import Conventions, Installation
 from shipgym.trials.cuts import cut_log
-from shipgym.trials.installation import Installation
 from shipgym.trials.readers.frames import read_frame
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable

@@ -11,9 +11,8 @@ from shipgym.errors import InputError
 from shipgym.files import check_readable
 from shipgym.ships.particulars import Particulars
 from shipgym.trials.columns import Column, parse_columns
-from shipgym.trials.conventions import Conventions
+from shipgym.trials.conventions import AS_LOGGED, Conventions, Installation
 from shipgym.trials.cuts import check_cut
-from shipgym.trials.installation import AS_LOGGED, Installation
 from shipgym.trials.trial import KINDS, USES
 
 _CONVENTIONS = ("rudder_positive", "velocity_frame", "origin", "repair")

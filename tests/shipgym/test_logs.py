@@ -7,9 +7,6 @@ import numpy as np
 import pytest
 
 from shipgym.errors import InputError
-from shipgym.manoeuvres import zigzag
-from shipgym.models import load_model
-from shipgym.trials.instrument_offsets import rudder_offset, straight_parts
 from shipgym.trials.navigation import local_metres
 from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial
@@ -458,34 +455,6 @@ def test_a_magnetic_heading_is_told_and_its_offset_taken_out(tmp_path):
         path, COLUMNS, "port", sensors=ANTENNA | {"heading_offset_deg": "estimate"}
     )
     assert error(right, "psi") < 0.5 * DEGREE
-
-
-def test_the_zero_of_the_rudder_is_estimated_from_straight_parts(tmp_path):
-    path = written(tmp_path / "run.csv", delta=SAILED["delta"] + 1.5 * DEGREE)
-    trial = Trial.from_csv(path, sensors={"rudder_offset_deg": "estimate"})
-    assert error(trial, "delta") < 0.05 * DEGREE
-    assert (
-        error(Trial.from_csv(path, sensors={"rudder_offset_deg": 1.5}), "delta") < 1e-6
-    )
-
-
-@pytest.mark.parametrize("name", ["kvlcc2", "mariner", "container"])
-@pytest.mark.parametrize("angle", [5.0, 10.0])
-def test_overshoots_are_not_taken_for_straight_parts(name, angle):
-    """At an overshoot heading and rudder hardly change: only straight runs count."""
-    trial = zigzag(load_model(name), angle, angle, dt=1.0)
-    noise = np.random.default_rng(0).normal(0.0, 0.1 * DEGREE, (2, len(trial) + 60))
-    psi = np.append(np.full(60, trial["psi"][0]), trial["psi"]) + noise[0]
-    delta = np.append(np.zeros(60), trial["delta"]) + noise[1] + 3.0 * DEGREE
-    t = np.arange(psi.size, dtype=float)
-    found = []
-    for first in (0, 60):
-        channels = {"psi": psi[first:], "delta": delta[first:]}
-        found.append(
-            rudder_offset(t[first:], channels, straight_parts(t[first:], channels))
-        )
-    assert found[0] == pytest.approx(3.0 * DEGREE, abs=0.1 * DEGREE)
-    assert found[1] is None
 
 
 def test_a_ship_at_berth_is_named(tmp_path):

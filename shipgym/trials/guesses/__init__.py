@@ -1,10 +1,10 @@
 """Columns, units, signs and frames of a log, guessed, each with its reason."""
 
 from shipgym.trials.guesses.columns import ColumnGuess, guess_columns
-from shipgym.trials.guesses.sides import RudderSide
 from shipgym.trials.guesses.trials import (
     ConventionGuess,
     Decision,
+    RudderSide,
     TrialGuess,
     guess_trial,
 )

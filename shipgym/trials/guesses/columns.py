@@ -145,7 +145,9 @@ def guess_columns(table: LogTable) -> list[ColumnGuess]:
     if "delta" not in guesses and "delta_command" not in guesses:
         command = steering_command(table, free)
         if command is not None:
-            guesses["delta"] = ColumnGuess("delta", *command)
+            column, reason, keys = command
+            extra = tuple(keys.items())
+            guesses["delta"] = ColumnGuess("delta", column, "deg", reason, extra)
     _settle_rudder(table, guesses)
     for channel in ("delta", "delta_command"):
         if channel in guesses:

@@ -1,7 +1,7 @@
 """Steering commands of boats without a rudder: two propellers, or a pulse width."""
 
 import re
-from typing import NamedTuple
+from itertools import combinations
 
 import numpy as np
 
@@ -10,23 +10,9 @@ from shipgym.errors import InputError
 from shipgym.trials.column_values import FULL_RUDDER_DEG
 from shipgym.trials.readers.log_table import LogTable
 
-_SIDES = {
-    "left": "port",
-    "port": "port",
-    "l": "port",
-    "p": "port",
-    "bb": "port",
-    "backbord": "port",
-    "babord": "port",
-    "right": "starboard",
-    "starboard": "starboard",
-    "stbd": "starboard",
-    "stb": "starboard",
-    "r": "starboard",
-    "s": "starboard",
-    "sb": "starboard",
-    "steuerbord": "starboard",
-    "tribord": "starboard",
+_PORT = {"left", "port", "l", "p", "bb", "backbord", "babord"}
+_STARBOARD = {
+    *("right", "starboard", "stbd", "stb", "r", "s", "sb", "steuerbord", "tribord")
 }
 #: Words of a name that is a propeller's or motor's, not another thing with two sides.
 _PROPELLER = re.compile(
@@ -40,17 +26,11 @@ _SERVO = re.compile(
 )
 _NEUTRAL, _SPAN = 1500.0, 400.0  # us, of radio control's servos
 
-
-class SteeringGuess(NamedTuple):
-    """A steering command as a nominal rudder, and why."""
-
-    column: str
-    unit: str
-    reason: str
-    extra: tuple[tuple[str, str | float], ...]
+#: A column, why it steers, and the other keys of its declaration.
+Command = tuple[str, str, dict[str, str | float]]
 
 
-def steering_command(table: LogTable, free: list[str]) -> SteeringGuess | None:
+def steering_command(table: LogTable, free: list[str]) -> Command | None:
     """Steering command in columns of no other channel, which are then not free."""
     numbers = {}
     for column in free:
@@ -61,50 +41,49 @@ def steering_command(table: LogTable, free: list[str]) -> SteeringGuess | None:
         known = values[np.isfinite(values)]
         if known.size and np.ptp(known) > 0.0:
             numbers[column] = known
-    guess = _two_propellers(numbers) or _servo(numbers)
-    if guess is not None:
-        for used in (guess.column, dict(guess.extra).get("minus")):
-            if used in free:
-                free.remove(str(used))
-    return guess
+    command = _two_propellers(numbers) or _servo(numbers)
+    if command is not None:
+        column, _, keys = command
+        for used in {column, keys.get("minus")} & set(free):
+            free.remove(str(used))
+    return command
 
 
-def _two_propellers(numbers: dict[str, Floats]) -> SteeringGuess | None:
+def _two_propellers(numbers: dict[str, Floats]) -> Command | None:
     """Difference of the propellers of port and starboard."""
     by_rest: dict[str, dict[str, str]] = {}
     for column in numbers:
-        parted = _side(column)
-        if parted is not None:
-            side, rest = parted
+        side, rest = _side(column)
+        if side:
             by_rest.setdefault(rest, {})[side] = column
     for rest, sides in by_rest.items():
-        if len(sides) < 2 or not _PROPELLER.search(rest):
-            continue
-        port = sides["port"]
-        starboard = sides["starboard"]
-        both = np.concatenate([numbers[port], numbers[starboard]])
-        if _is_pulse_width(both):
+        if len(sides) == 2 and _PROPELLER.search(rest):
+            port, starboard = sides["port"], sides["starboard"]
+            both = np.concatenate([numbers[port], numbers[starboard]])
             full = 2.0 * _SPAN
-        else:
-            full = _rounded(2.0 * float(np.mean(np.abs(both))))
-        reason = (
-            f"steering command: '{port}' minus '{starboard}', of which {full:g} counts"
-            f" as {FULL_RUDDER_DEG:g} deg of a nominal rudder"
-        )
-        extra = (("minus", starboard), ("full", full))
-        return SteeringGuess(port, "deg", reason, extra)
+            if not _is_pulse_width(both):
+                full = float(f"{2.0 * float(np.mean(np.abs(both))):.2g}") or 1.0
+            return _difference(port, starboard, f"of which {full:g}", full)
     return None
 
 
-def _side(column: str) -> tuple[str, str] | None:
-    """Side that a column's name tells, and the rest of the name; None without one."""
+def _difference(first: str, second: str, words: str, full: float) -> Command:
+    reason = (
+        f"steering command: '{first}' minus '{second}', {words} counts as"
+        f" {FULL_RUDDER_DEG:g} deg of a nominal rudder"
+    )
+    return first, reason, {"minus": second, "full": full}
+
+
+def _side(column: str) -> tuple[str, str]:
+    """Side that a column's name tells, empty without one, and the rest of the name."""
     apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", column)
     words = re.findall(r"[^\W_]+", apart.lower())
     for number, word in enumerate(words):
-        if word in _SIDES:
-            rest = words[:number] + words[number + 1 :]
-            return _SIDES[word], " ".join(rest) or "n"
-    return None
+        if word in _PORT or word in _STARBOARD:
+            rest = " ".join(words[:number] + words[number + 1 :])
+            return "port" if word in _PORT else "starboard", rest or "n"
+    return "", ""
 
 
 def other_rudder(table: LogTable, column: str, free: list[str]) -> str | None:
@@ -112,13 +91,12 @@ def other_rudder(table: LogTable, column: str, free: list[str]) -> str | None:
 
     One that stands still is none.
     """
+    side, rest = _side(column)
     for other in free:
-        here = _side(column)
-        there = _side(other)
-        if here is not None and there is not None:
-            are_sides = here[0] != there[0] and here[1] == there[1]
-        else:
-            are_sides = column.replace("1", "2", 1) == other != column
+        other_side, other_rest = _side(other)
+        are_sides = column.replace("1", "2", 1) == other != column
+        if side and other_side:
+            are_sides = side != other_side and rest == other_rest
         if not are_sides:
             continue
         try:
@@ -131,52 +109,28 @@ def other_rudder(table: LogTable, column: str, free: list[str]) -> str | None:
     return None
 
 
-def _servo(numbers: dict[str, Floats]) -> SteeringGuess | None:
-    """The first pulse width that a servo of radio control gets."""
+def _servo(numbers: dict[str, Floats]) -> Command | None:
+    """The first pulse width that a servo of radio control gets.
+
+    Of two motors of which one goes up where the other goes down it is the difference.
+    """
     servos = {}
     for column, values in numbers.items():
         if _SERVO.fullmatch(column) and _is_pulse_width(values):
             servos[column] = values
-    mirrored = _mirrored(servos)
-    if mirrored is not None:
-        left, right = mirrored
-        reason = (
-            f"steering command: '{left}' minus '{right}', two motors that mirror each"
-            f" other, of which {2.0 * _SPAN:g} us counts as {FULL_RUDDER_DEG:g} deg of"
-            " a nominal rudder"
-        )
-        extra = (("minus", right), ("full", 2.0 * _SPAN))
-        return SteeringGuess(left, "deg", reason, extra)
+    for (left, a), (right, b) in combinations(servos.items(), 2):
+        if a.size == b.size and np.corrcoef(a, b)[0, 1] < -0.8:
+            words = f"two motors that mirror each other, of which {2.0 * _SPAN:g} us"
+            return _difference(left, right, words, 2.0 * _SPAN)
     if not servos:
         return None
-
-    column = next(iter(servos))
     reason = (
         f"steering command: a pulse width in us, neutral at {_NEUTRAL:g}, of which"
         f" {_SPAN:g} counts as {FULL_RUDDER_DEG:g} deg of a nominal rudder"
     )
-    pulses = (("neutral", _NEUTRAL), ("full", _SPAN))
-    return SteeringGuess(column, "deg", reason, pulses)
-
-
-def _mirrored(servos: dict[str, Floats]) -> tuple[str, str] | None:
-    """The first two servos of which one goes up where the other goes down."""
-    names = list(servos)
-    for number, left in enumerate(names):
-        for right in names[number + 1 :]:
-            a = servos[left]
-            b = servos[right]
-            if a.size == b.size and np.corrcoef(a, b)[0, 1] < -0.8:
-                return left, right
-    return None
+    return next(iter(servos)), reason, {"neutral": _NEUTRAL, "full": _SPAN}
 
 
 def _is_pulse_width(values: Floats) -> bool:
     """Return whether values may be pulse widths in us."""
-    least = float(values.min())
-    most = float(values.max())
-    return least >= 700.0 and 1000.0 < most <= 2300.0
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.2g}") or 1.0
+    return values.min() >= 700.0 and 1000.0 < values.max() <= 2300.0

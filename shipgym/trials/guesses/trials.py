@@ -7,19 +7,34 @@ from typing import Any, NamedTuple
 
 from shipgym.checks import quoted, shown
 from shipgym.errors import InputError
-from shipgym.trials.conventions import Conventions
+from shipgym.trials.conventions import Conventions, Installation
 from shipgym.trials.guesses.columns import ColumnGuess, guess_columns
-from shipgym.trials.guesses.sides import RudderSide, rudder_side
 from shipgym.trials.guesses.speeds import settle_speeds
-from shipgym.trials.installation import Installation
+from shipgym.trials.readers.cell_texts import number_with_side
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable
+from shipgym.trials.rudder_sign import rudder_sign
 from shipgym.trials.trial import Trial, trial_of
 from shipgym.trials.trial_import import import_tables
 from shipgym.trials.units import QUANTITIES
 
 #: What a message names that is cured by a line of the ship file.
 _CURABLE = ("[columns]", "[conventions]", "[sensors]", "declare ", "column = ")
+
+
+class RudderSide(NamedTuple):
+    """The side to which a positive rudder steers; None where it cannot be told."""
+
+    side: str | None
+    reason: str
+
+    @property
+    def choices(self) -> str:
+        """What there is to decide."""
+        return (
+            '"starboard" or "port", the side to which the ship turns with a positive'
+            f" rudder: {self.reason}"
+        )
 
 
 class ConventionGuess(NamedTuple):
@@ -94,41 +109,37 @@ def guess_trial(path: str | Path, *, checksums: str = "optional") -> TrialGuess:
     if not knows_channels:
         columns = {guess.channel: guess for guess in guess_columns(table)}
         columns = settle_speeds(table, columns)
-        missing = _missing_columns(table, columns)
-        if missing:
-            return _undecided(table, columns, missing)
+    decisions = [] if knows_channels else _missing_columns(table, columns)
     conventions: dict[str, ConventionGuess] = {}
-    decisions: list[Decision] = []
     tried: set[tuple[str, str]] = set()
-    while True:
+    trial = None
+    while trial is None and not any(one.section != "sensors" for one in decisions):
         try:
             trial = _read(table, columns, conventions, decisions)
-            break
         except InputError as error:
             proposal = _next_proposal(error, columns, tried)
             if proposal is None:
-                decision = _decision(error, decisions)
-                if decision is None:
-                    raise
-                decisions.append(decision)
-                if decision.section == "trials":
-                    return _undecided(table, columns, decisions)
+                decisions.append(_decision(error, decisions))
                 continue
-        tried.add(proposal)
-        name, value = proposal
-        if name in columns:
-            columns[name] = _with_unit(columns[name], value)
-        else:
-            reason = "without it a log is refused"
-            conventions[name] = ConventionGuess(name, value, reason)
+            tried.add(proposal)
+            name, value = proposal
+            if name in columns:
+                columns[name] = _with_unit(columns[name], value)
+            else:
+                reason = "without it a log is refused"
+                conventions[name] = ConventionGuess(name, value, reason)
 
-    is_turned = "rudder_positive" in conventions
-    side = rudder_side(table, trial, columns.get("delta"), is_turned=is_turned)
-    if side is not None and side.side == "port" and not is_turned:
-        turned = ConventionGuess("rudder_positive", "port", side.reason)
-        conventions["rudder_positive"] = turned
-        trial = _read(table, columns, conventions, decisions)
-    conventions.pop("rudder_positive", None)
+    side = None
+    if trial is None:
+        conventions = {}
+    else:
+        is_turned = "rudder_positive" in conventions
+        side = _rudder_side(table, trial, columns.get("delta"), is_turned=is_turned)
+        if side is not None and side.side == "port" and not is_turned:
+            turned = ConventionGuess("rudder_positive", "port", side.reason)
+            conventions["rudder_positive"] = turned
+            trial = _read(table, columns, conventions, decisions)
+        conventions.pop("rudder_positive", None)
     return TrialGuess(
         path=table.path,
         columns=list(columns.values()),
@@ -138,6 +149,32 @@ def guess_trial(path: str | Path, *, checksums: str = "optional") -> TrialGuess:
         side=side,
         decisions=decisions,
     )
+
+
+def _rudder_side(
+    table: LogTable, trial: Trial, column: ColumnGuess | None, *, is_turned: bool
+) -> RudderSide | None:
+    """Side of the rudder in a log that was read, `is_turned` with positive to port.
+
+    None without a rudder or heading.
+    """
+    if not {"psi", "delta"} <= trial.channels.keys():
+        return None
+    if column is not None:
+        first = next(filter(None, table.texts(column.column)), "")
+        if table.decimal_comma:
+            first = first.replace(",", ".")
+        if number_with_side(first) is not None:
+            return RudderSide("starboard", "the letters S and P of its values")
+    found = rudder_sign(trial.t, trial["psi"], trial["delta"])
+    if found.side is None:
+        hint = found.side_by_hint(is_turned=is_turned)
+        return RudderSide(None, f"the log does not tell{hint}")
+    if not is_turned:
+        return RudderSide(found.side, found.reason)
+    if found.side == "port":
+        return RudderSide(None, "two checks of the log contradict each other")
+    return RudderSide("port", found.reason)
 
 
 def _unused(table: LogTable, columns: Mapping[str, ColumnGuess]) -> list[str]:
@@ -174,33 +211,16 @@ def _missing_columns(
     return missing
 
 
-def _undecided(
-    table: LogTable, columns: Mapping[str, ColumnGuess], decisions: list[Decision]
-) -> TrialGuess:
-    """A log that cannot be read before something is decided."""
-    return TrialGuess(
-        path=table.path,
-        columns=list(columns.values()),
-        conventions=[],
-        trial=None,
-        unused=_unused(table, columns),
-        side=None,
-        decisions=decisions,
-    )
-
-
-def _decision(error: InputError, decisions: list[Decision]) -> Decision | None:
-    """The decision that a refusal leaves to the user; None where it cannot be cured."""
+def _decision(error: InputError, decisions: list[Decision]) -> Decision:
+    """The decision that a refusal leaves to the user; the error where it is none."""
     message = str(error)
-    if "clock_offsets" in message:
-        if any(one.key == "clock_offsets" for one in decisions):
-            return None
+    if "clock_offsets" in message and not decisions:
         return Decision("sensors", "clock_offsets", f'"correct" or "keep": {message}')
-    if any(cure in message for cure in _CURABLE):
-        return Decision(
-            "trials", "use", f'"fit" once this is settled, or "skip": {message}'
-        )
-    return None
+    if "clock_offsets" in message or not any(cure in message for cure in _CURABLE):
+        raise error
+    return Decision(
+        "trials", "use", f'"fit" once this is settled, or "skip": {message}'
+    )
 
 
 def _read(

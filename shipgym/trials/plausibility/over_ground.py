@@ -8,8 +8,8 @@ import numpy.typing as npt
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
+from shipgym.trials.conventions import Installation
 from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.installation import Installation
 from shipgym.trials.instrument_offsets import heading_offset, straight_parts
 from shipgym.trials.resampling import Log
 from shipgym.trials.units import DEGREE
