@@ -1,4 +1,4 @@
-"""Run the papers' tables: `python scripts/reproduce.py all`, a paper, `requirements`.
+"""Run the papers' tables: `python scripts/reproduce.py all`, or a paper.
 
 Two minutes in all. `shipgym reproduce` runs this program. Exits with 1 if an
 aim is missed.
@@ -26,9 +26,7 @@ app = typer.Typer(
 def main(
     paper: Annotated[
         str,
-        typer.Argument(
-            metavar="PAPER", help="A paper's short name, comparators or requirements."
-        ),
+        typer.Argument(metavar="PAPER", help="A paper's short name, or all."),
     ] = ALL,
     markdown: Annotated[
         Path | None,
@@ -42,12 +40,6 @@ def main(
         str | None,
         typer.Option(metavar="NAME", help='One row, such as "X_uu: error, %".'),
     ] = None,
-    images: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER", help="Draw the papers' figures into this folder."
-        ),
-    ] = None,
 ) -> None:
     """Run the papers' tables: printed, their way, at best, and aims met."""
     names = papers_of(paper)
@@ -57,19 +49,12 @@ def main(
     results = chosen(results, table, row)
     if markdown is not None:
         write_text(page(results), markdown)
-    drawn = []
-    if images is not None:
-        from papers.figures import draw  # matplotlib, and every paper
-
-        drawn = [file for name in names for file in draw(name, images)]
     answer({name: [row.to_dict() for row in rows] for name, rows in results.items()})
     for name, rows in results.items():
         console.print(terminal_table(name, rows))
         console.print()
     if markdown is not None:
         console.print(f"written: {markdown}", soft_wrap=True)
-    for file in drawn:
-        console.print(f"written: {file}", soft_wrap=True)
     late = missed(results)
     if late:
         fail(f"{len(late)} aims missed: {'; '.join(late)}", FAILED)

@@ -19,10 +19,7 @@ def reproduce_command(
         str,
         Argument(
             metavar="PAPER",
-            help=(
-                "cao2015, xu2020, zhu2018, mei2019, song2020, comparators, requirements"
-                " or all."
-            ),
+            help="cao2015, xu2020, zhu2018, mei2019, song2020 or all.",
         ),
     ],
     markdown: Annotated[

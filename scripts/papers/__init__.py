@@ -1,30 +1,28 @@
 """The papers' cases: as printed, as computed their way, and at best.
 
 One file or folder per paper. Each has a `PAPER`: a citation and a function that yields
-the rows of its tables. Beside them stand two comparators, and Zhu's requirements R1 to
-R8, in the same form.
+the rows of its tables.
 """
 
 from __future__ import annotations
 
 from importlib import import_module
 
-from papers.row import Conclusion, Paper, Requirement, Row
+from papers.row import Conclusion, Paper, Row
 from shipgym.checks import check_choice
 
-__all__ = ["CASES", "PAPERS", "Conclusion", "Paper", "Requirement", "Row", "get_paper"]
+__all__ = ["PAPERS", "Conclusion", "Paper", "Row", "get_paper"]
 
 PAPERS = ("cao2015", "xu2020", "zhu2018", "mei2019", "song2020")
-CASES = (*PAPERS, "comparators", "requirements")
 
 
 def get_paper(name: str) -> Paper:
-    """A paper's cases by the paper's short name, or `requirements`.
+    """A paper's cases by the paper's short name.
 
     Raises
     ------
     InputError
         If there is none of that name.
     """
-    paper: Paper = import_module(f"papers.{check_choice(name, CASES, 'paper')}").PAPER
+    paper: Paper = import_module(f"papers.{check_choice(name, PAPERS, 'paper')}").PAPER
     return paper

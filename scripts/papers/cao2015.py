@@ -369,13 +369,4 @@ PAPER = Paper(
             "Euler's (3 printed, 3.5 here) differ by a rounding."
         ),
     ),
-    figures=(
-        (
-            "reproduction_cao2015.png",
-            (
-                "The 25/25 zigzag and the 30 deg turning circle, predicted by what each"
-                " sample structure finds in one 15/15 zigzag (figures 4, 6, 8 and 10)"
-            ),
-        ),
-    ),
 )

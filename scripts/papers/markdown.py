@@ -1,10 +1,10 @@
-"""The page of the documentation: a screen a paper, and its rows behind a fold."""
+"""The page of the documentation: what became of each paper, on a screen."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from papers import Conclusion, Paper, Requirement, Row, get_paper
+from papers import Conclusion, Row, get_paper
 from papers.row import (
     COMPUTED,
     CONFIRMED,
@@ -18,9 +18,9 @@ from papers.row import (
 INTRODUCTION = """# The papers' tables, run again
 
 `shipgym reproduce all --markdown docs/reproduction.md` wrote this page. For each paper:
-what it claims, whether that holds here, and where print and recomputation differ. The
-rows lie behind a fold; `shipgym reproduce zhu2018 --table "Table 7.4.9"` shows a table
-with its aims.
+what it claims, whether that holds here, and where print and recomputation differ.
+`shipgym reproduce zhu2018 --table "Table 7.4.9"` shows the rows of a table with their
+aims.
 
 *Agree with print*: printed figures that the paper's own method gives on the same case,
 within 10 % or the rounding of the printed digits; each printed figure counts once. *By
@@ -28,11 +28,6 @@ construction*: figures that agree because they were put in, or because a setting
 picked beside them; they say nothing. *Aims met*: whether the best method here, on the
 same data, reaches what was asked of it.
 """
-LEGEND = (
-    "`printed = ours` agrees, `printed ≠ ours` does not, `printed ≡ ours` by"
-    " construction, a number alone has nothing printed or is printed above; in"
-    " brackets: at best."
-)
 
 
 def page(results: Mapping[str, Sequence[Row]]) -> str:
@@ -90,16 +85,12 @@ def _section(name: str, rows: Sequence[Row]) -> str:
         "",
         _counts(rows),
         "",
-        *_requirements(paper.requirements),
         *_conclusions(paper.conclusions, rows),
     ]
     if paper.differences:
         lines += ["Where print and recomputation differ, and why:", ""]
         lines += [f"* {one}" for one in paper.differences]
         lines.append("")
-    for file, caption in paper.figures:
-        lines += [f"![{name}](images/{file})", "", f"*{caption}*", ""]
-    lines += _fold(paper, rows)
     return "\n".join([*lines, ""])
 
 
@@ -138,87 +129,6 @@ def _found(row: Row) -> str:
     """Ours by the paper's method and, in brackets, at best."""
     best = "" if row.best is None else f"({number(row.best, 3)})"
     return " ".join(filter(None, (number(row.as_paper, 3), best)))
-
-
-def _requirements(requirements: Sequence[Requirement]) -> list[str]:
-    """Requirement, reason, and the tests and tables that show it; none for a paper."""
-    if not requirements:
-        return []
-    lines = [
-        "| | requirement | why it holds | tests | tables |",
-        "| --- | --- | --- | --- | --- |",
-    ]
-    for one in requirements:
-        tests = "<br>".join(f"`{test}`" for test in one.tests)
-        cells = (one.name, one.statement, one.argument, tests, "<br>".join(one.tables))
-        lines.append("| " + " | ".join(map(_escaped, cells)) + " |")
-    return [*lines, ""]
-
-
-def _fold(paper: Paper, rows: Sequence[Row]) -> list[str]:
-    """The rows, those that differ only in their first words in one line, folded."""
-    cases: dict[str, list[Row]] = {}
-    for row in rows:
-        cases.setdefault(row.case, []).append(row)
-    notes = list(dict.fromkeys(filter(None, map(_note, rows))))
-
-    lines = [
-        '<details markdown="1">',
-        f"<summary>{len(rows)} rows</summary>",
-        "",
-        f"Ours: {paper.ours}. {LEGEND}",
-        "",
-        "| case | figures | note |",
-        "| --- | --- | --- |",
-    ]
-    for case, shown in cases.items():
-        numbers = dict.fromkeys(
-            notes.index(_note(row)) + 1 for row in shown if _note(row)
-        )
-        cells = (case, "<br>".join(_grouped(shown)), ", ".join(map(str, numbers)))
-        lines.append("| " + " | ".join(map(_escaped, cells)) + " |")
-    lines.append("")
-    lines += [f"{k}. {note}" for k, note in enumerate(notes, start=1)]
-    return [*lines, "", "</details>"]
-
-
-def _note(row: Row) -> str:
-    """The note of a printed figure that does not simply agree; none of the others."""
-    agrees = row.agrees and row.basis == COMPUTED
-    if row.printed is None or row.basis == ELSEWHERE or agrees:
-        return ""
-    return row.note
-
-
-def _grouped(rows: Sequence[Row]) -> list[str]:
-    """Figures of a case, those with the same words before or after a colon together."""
-    parts = [row.quantity.partition(": ") for row in rows]
-    before, after = ({part[k] for part in parts} for k in (0, 2))
-    common, own = (2, 0) if len(after) <= len(before) else (0, 2)
-    groups: dict[str, list[str]] = {}
-    for row, part in zip(rows, parts, strict=True):
-        if part[2]:
-            groups.setdefault(part[common], []).append(_figure(row, part[own]))
-        else:
-            groups.setdefault("", []).append(_figure(row, part[0]))
-    return [
-        f"{words}: {'; '.join(figures)}" if words else "; ".join(figures)
-        for words, figures in groups.items()
-    ]
-
-
-def _figure(row: Row, subject: str) -> str:
-    """What is measured, printed and found, at best in brackets."""
-    sign = {True: "=", False: "≠", None: ""}[row.agrees]
-    if row.agrees and row.basis not in (COMPUTED, ELSEWHERE):
-        sign = "≡"
-    best = "" if row.best is None else f"({number(row.best, 2)})"
-    ours = number(row.as_paper, 3)
-    printed = number(row.printed)
-    if row.basis == ELSEWHERE:
-        printed = sign = ""
-    parts = (subject, printed, sign, ours, best)
-    return " ".join(filter(None, parts))
 
 
 def _escaped(text: str) -> str:

@@ -490,14 +490,4 @@ PAPER = Paper(
     " MARIN's measured zigzags.",
     rows,
     conclusions=CONCLUSIONS,
-    figures=(
-        (
-            "reproduction_mei2019.png",
-            (
-                "35 deg turns of KVLCC2's MMG model, which her zigzags of 10 and 20 deg"
-                " do not show: the bare tanker, RM-SVM as the paper, RM-SVM at best,"
-                " and a neural network taught the same zigzags"
-            ),
-        ),
-    ),
 )

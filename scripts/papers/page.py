@@ -8,7 +8,7 @@ from itertools import groupby
 from rich.table import Table
 
 from agents.cli.tables import plain_table
-from papers import CASES, Row, get_paper
+from papers import PAPERS, Row, get_paper
 from papers.row import COMPUTED, number
 from shipgym.checks import check_choice
 
@@ -18,14 +18,14 @@ NUMBERS = ("printed", "{ours}", "at best")
 
 
 def papers_of(name: str) -> tuple[str, ...]:
-    """Short names of the papers asked for: one or all, the requirements last.
+    """Short names of the papers asked for: one or all.
 
     Raises
     ------
     InputError
         If there is none of that name.
     """
-    return CASES if check_choice(name, (*CASES, ALL), "paper") == ALL else (name,)
+    return PAPERS if check_choice(name, (*PAPERS, ALL), "paper") == ALL else (name,)
 
 
 def reproduce(

@@ -154,32 +154,6 @@ class Conclusion:
 
 
 @dataclass(frozen=True)
-class Requirement:
-    """What a model or a method has to be, and what shows that ours is.
-
-    Attributes
-    ----------
-    name : str
-        `R1` to `R8` of Zhu 2018, chapter 2; the rows that measure it have it for their
-        case.
-    statement : str
-        The requirement.
-    argument : str
-        Why it holds; where it holds by theory, the proof.
-    tests : tuple of str
-        That show it: file and function, as pytest takes them.
-    tables : tuple of str
-        That show it: paper and table.
-    """
-
-    name: str
-    statement: str
-    argument: str
-    tests: tuple[str, ...]
-    tables: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
 class Paper:
     """A paper and how its cases are run again.
 
@@ -193,14 +167,10 @@ class Paper:
         One sentence: which cases, on which data.
     rows : callable
         Yields the rows, in the order of the paper.
-    requirements : tuple of Requirement
-        That the rows measure; of the tables of a paper none.
     conclusions : tuple of Conclusion
         Of the paper.
     differences : tuple of str
         Where print and recomputation differ, and why.
-    figures : tuple of (str, str)
-        File name in `docs/images` and caption; `papers.figures` draws them.
     ours : str
         Heading of the column `as_paper`.
     """
@@ -209,8 +179,6 @@ class Paper:
     citation: str
     what: str
     rows: Callable[[], Iterator[Row]]
-    requirements: tuple[Requirement, ...] = ()
     conclusions: tuple[Conclusion, ...] = ()
     differences: tuple[str, ...] = ()
-    figures: tuple[tuple[str, str], ...] = ()
     ours: str = "as the paper"

@@ -479,14 +479,4 @@ PAPER = Paper(
         ),
         ("Yukun's trials are not published; the container ship stands in."),
     ),
-    figures=(
-        (
-            "reproduction_song2020.png",
-            (
-                "K and T of Hual Trooper sample by sample: the stochastic gradient, the"
-                " nonlinear innovation, inverse-free multi-innovation least squares"
-                " and, with the noise of instruments, the extended Kalman filter"
-            ),
-        ),
-    ),
 )

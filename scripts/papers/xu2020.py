@@ -687,15 +687,4 @@ PAPER = Paper(
             "noise and no model error."
         ),
     ),
-    figures=(
-        (
-            "reproduction_xu2020.png",
-            (
-                "Singular values of the scaled regressors, 38 terms and the 18 of Table"
-                " 11; errors of the 38 coefficients and of the forces in tests not"
-                " fitted, against the rank kept, at four noises (dot: corner of the"
-                " L-curve)"
-            ),
-        ),
-    ),
 )

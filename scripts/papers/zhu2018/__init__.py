@@ -207,28 +207,4 @@ PAPER = Paper(
         ),
         ("The logs of 7.2 and 7.5 are not published; stand-ins take their place."),
     ),
-    figures=(
-        (
-            "reproduction_zhu2018_recursive.png",
-            (
-                "Table 7.3.2 sample by sample: two of the Mariner's six parameters by"
-                " RLS from zero and from LS-SVR, on a ship integrated accurately and on"
-                " one integrated by Euler's rule"
-            ),
-        ),
-        (
-            "reproduction_zhu2018_zigzag.png",
-            (
-                "The container ship's 20/20 zigzag, predicted from her 10/10 by seven"
-                " terms, by the chosen four, by a neural network, and at best"
-            ),
-        ),
-        (
-            "reproduction_zhu2018_samples.png",
-            (
-                "Mean squared error of prediction against the number of samples"
-                " (figures 7.4.9 and 7.4.10); dashed: the thesis with all samples"
-            ),
-        ),
-    ),
 )
