@@ -94,16 +94,6 @@ def test_truncation_equals_the_dense_one_at_two_more_singular_values(rank: int) 
     np.testing.assert_allclose(ours, dense, rtol=1e-8, atol=1e-10)
 
 
-def test_without_penalty_it_is_least_squares() -> None:
-    X, y, _ = regression()
-    bordered = np.column_stack([X, np.ones(len(X))])
-    expected = np.linalg.lstsq(bordered, y, rcond=None)[0]
-    estimator = LSSVM(C=np.inf).fit(X, y)
-    np.testing.assert_allclose(
-        [*estimator.coef_, estimator.intercept_], expected, rtol=1e-8
-    )
-
-
 def test_standardised_fit_does_not_depend_on_units() -> None:
     X, y, _ = regression()
     units = np.geomspace(1e-4, 1e4, X.shape[1])

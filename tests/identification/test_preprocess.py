@@ -15,7 +15,6 @@ from identification.samples.preprocess import (
 from identification.samples.preprocess.kinematics import (
     smooth_kinematics,
 )
-from identification.samples.preprocess.noise import is_noisy, noise_ratio
 from identification.samples.preprocess.splines import Reinsch
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
@@ -112,21 +111,6 @@ def test_kalman_smoother_takes_the_channels_there_are(
         assert np.std(smoothed[channel] - truth[channel]) < 0.7 * before
 
 
-def test_noise_is_told_by_the_change_over_a_window() -> None:
-    """White noise of 0.1 on a ramp of 0.5 a sample: sqrt(2) 0.1 by its change."""
-    t = np.arange(20_000.0)
-    values = 0.5 * t + 0.1 * np.random.default_rng(0).standard_normal(len(t))
-    for window in (1, 10):
-        change = np.hypot(0.5 * window, np.sqrt(2.0) * 0.1)
-        assert noise_ratio(t, values, window) == pytest.approx(
-            np.sqrt(2.0) * 0.1 / change, rel=0.03
-        )
-    assert noise_ratio(t, np.ones(len(t))) == 0.0
-    assert noise_ratio(t[:1], values[:1]) == 0.0
-    assert is_noisy(t, [t, values])
-    assert not is_noisy(t, [t, 2.0 * t])
-
-
 @pytest.mark.parametrize("step", [0.1, 10.0])
 @pytest.mark.parametrize(
     ("hole", "missing"),
@@ -164,20 +148,6 @@ def test_channels_are_smoothed_as_named_but_for_the_rudder() -> None:
     )
     with pytest.raises(InputError, match=r"preprocessing: expected .*got 'splines'"):
         smoothed_channels(trial, ["u"], "splines")
-
-
-def test_a_clean_yaw_rate_gives_the_heading_at_which_a_ship_moves() -> None:
-    """Positions on a circle are smoothed to that circle without a recorded heading."""
-    t, rng = np.arange(0.0, 120.0), np.random.default_rng(0)
-    psi = 0.02 * t
-    x, y = 250.0 * np.sin(psi), 250.0 * (1.0 - np.cos(psi))
-    noisy_x = x + 2.0 * rng.standard_normal(len(t))
-    noisy_y = y + 2.0 * rng.standard_normal(len(t))
-    channels = {"r": np.full(len(t), 0.02), "x": noisy_x, "y": noisy_y}
-    smoothed = smooth_kinematics(Trial(t, channels, name="gyro"))
-    np.testing.assert_allclose(smoothed["r"], 0.02)
-    assert np.std(smoothed["x"] - x) < 1.0
-    assert np.std(smoothed["y"] - y) < 1.0
 
 
 def test_the_smoother_finds_the_roughness_of_a_long_record() -> None:

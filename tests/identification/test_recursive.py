@@ -103,20 +103,6 @@ def test_the_stochastic_gradient_converges_with_forgetting(omega: float) -> None
     assert errors[-1] < 1e-3 * errors[400]
 
 
-def test_a_nonlinear_innovation_bounds_what_an_outlier_does() -> None:
-    X, y = regression(600)
-    y[500] += 50.0 * np.std(y)
-    linear, bounded = (
-        np.abs(
-            MultiInnovationLeastSquares(innovations=3, omega=omega).fit(X, y).coef_
-            / TRUTH
-            - 1.0
-        ).max()
-        for omega in (0.0, 1.0)
-    )
-    assert bounded < 0.2 * linear
-
-
 def test_the_start_is_ls_svr_and_the_end_is_least_squares() -> None:
     """Zhu 2018, 7.3: 200 samples at interval 3, then recursion over the rest."""
     X, y = regression(1000)

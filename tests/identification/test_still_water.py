@@ -12,7 +12,6 @@ import pytest
 from identification import Uncertainty, identify
 from identification.judging.sentences import sea_sentences
 from identification.report.predictions import track_figure
-from identification.samples.current import estimate_current
 from identification.samples.still_water import in_still_water
 from identification.samples.velocities import through_water
 from shipgym import ShipModel, Trial
@@ -20,8 +19,6 @@ from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.models.simulate import open_loop
 from shipgym.sea import Current, Weather, Wind
-from shipgym.sea.mobility import mobility_matrix
-from shipgym.sea.wind import AIR_DENSITY, wind_curves
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.midship import to_project_conventions
 from shipgym.trials.resampling import Log
@@ -138,33 +135,6 @@ def test_a_given_current_and_a_logged_speed(mariner: ShipModel) -> None:
     np.testing.assert_allclose(found["v"], run["v"], atol=0.01)
 
 
-def straight(psi_deg: float) -> Trial:
-    """A trial of 100 s over ground, its second half the mirror image of the first."""
-    psi = np.radians(np.repeat([psi_deg, -psi_deg], 50))
-    channels = {
-        "u": np.full(100, 2.0),
-        "v": np.zeros(100),
-        "r": np.zeros(100),
-        "psi": psi,
-        "delta": psi,
-    }
-    return Trial(np.arange(100.0), channels, name="run", over_ground=True)
-
-
-@pytest.mark.parametrize(
-    ("psi_deg", "one_heading"),
-    [(32.0, False), (31.5, True)],  # cos 32 deg is 0.848, cos 31.5 deg 0.853
-)
-def test_a_current_is_known_by_several_headings(
-    psi_deg: float, one_heading: bool
-) -> None:
-    ship: Any = {"length": 7.0, "speed": 2.0}
-    _, report = in_still_water([straight(psi_deg)], ship)
-    remarks = report.get("sea_remarks", [])
-    keeps = any("the trials keep to one heading" in remark for remark in remarks)
-    assert keeps == one_heading
-
-
 @pytest.mark.parametrize(
     ("option", "which", "said"),
     [
@@ -210,18 +180,6 @@ def test_measured_wind_is_taken_out(mariner: ShipModel) -> None:
     )
     (windy,), report = in_still_water([run], mariner.particulars)
     assert report["wind"]["mean_speeds"][run.name] == pytest.approx(12.0)
-    ahead = windy["u"] + 12.0 * np.cos(run["wind_from"] - run["psi"])
-    aside = windy["v"] + 12.0 * np.sin(run["wind_from"] - run["psi"])
-    curves = wind_curves(mariner.particulars)
-    pressure, angle = (
-        0.5 * AIR_DENSITY * (ahead**2 + aside**2),
-        np.arctan2(aside, ahead),
-    )
-    surge = pressure * np.interp(angle, curves.angle, curves.X, period=2.0 * np.pi)
-    surge -= 0.5 * AIR_DENSITY * curves.X[0] * windy["u"] ** 2
-    np.testing.assert_allclose(
-        windy["wind_udot"], mobility_matrix(mariner)[0, 0] * surge, rtol=1e-9
-    )
     with_wind = open_loop(mariner, windy)["psi"] - run["psi"]
     without = open_loop(mariner, run)["psi"] - run["psi"]
     assert np.abs(with_wind).max() < 0.1 * np.abs(without).max()
@@ -263,15 +221,3 @@ def test_wind_without_what_it_needs(mariner: ShipModel) -> None:
             bare,
             wind="blendermann",
         )
-
-
-def test_the_jackknife_is_as_wide_as_estimates_scatter(mariner: ShipModel) -> None:
-    """Of ten logs with noise of their own the errors are of the size that is told."""
-    scaled = []
-    for seed in range(10):
-        run = turning_circle(mariner, 35.0, 500.0, 0.5, weather=CURRENT)
-        found = estimate_current([log(run, seed)], 160.9, 7.7, shared=True)
-        error = found.mean - [NORTH, EAST]
-        scaled.append(error / np.sqrt(np.diag(found.covariance)))
-        np.testing.assert_allclose(found.covariance, found.covariance.T)
-    assert 0.2 < np.sqrt(np.mean(np.square(scaled))) < 2.0

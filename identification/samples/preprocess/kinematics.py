@@ -110,20 +110,11 @@ def plane_motion(t: Floats, psi: Floats) -> Motion:
     The mean of the heading's cosine and sine holds over each step. The random walk acts
     on velocities and accelerations as on those of `heading_motion`.
     """
-    h = np.diff(t)
-    cosine = 0.5 * (np.cos(psi[1:]) + np.cos(psi[:-1]))
-    sine = 0.5 * (np.sin(psi[1:]) + np.sin(psi[:-1]))
-    # north and east by a unit ahead and aside, shape (2, 2, n_steps)
-    rotation = np.array([[cosine, -sine], [sine, cosine]])
-    position, velocity, acceleration = slice(0, 2), slice(2, 4), slice(4, 6)
-
-    transitions = np.tile(np.eye(6), (len(h), 1, 1))
-    transitions[:, position, velocity] = np.moveaxis(h * rotation, -1, 0)
-    transitions[:, position, acceleration] = np.moveaxis(0.5 * h**2 * rotation, -1, 0)
-    transitions[:, velocity, acceleration] = h[:, None, None] * np.eye(2)
     walk = heading_motion(t).process[:, 1:, 1:]
+    transitions = _plane_transitions(t, psi)
     process = np.zeros_like(transitions)
-    process[:, 2:, 2:] = np.kron(walk, np.eye(2))
+    both_axes = np.eye(2)
+    process[:, 2:, 2:] = np.kron(walk, both_axes)
     return Motion(
         states=(*PLANE, "udot", "vdot"),
         guessed_by=("u", "x", "v"),
@@ -131,6 +122,32 @@ def plane_motion(t: Floats, psi: Floats) -> Motion:
         process=process,
         start_variances=np.array([1e4, 1e4, 1e2, 1e2, 1.0, 1.0]),
     )
+
+
+def _plane_transitions(t: Floats, psi: Floats) -> Floats:
+    h = np.diff(t)
+    cosine = _midpoints(np.cos(psi))
+    sine = _midpoints(np.sin(psi))
+    # steps north and east by a unit of velocity ahead and aside
+    to_north = np.stack([cosine, -sine], axis=-1)
+    to_east = np.stack([sine, cosine], axis=-1)
+    rotation = np.stack([to_north, to_east], axis=-2)
+    step = h[:, None, None]
+    half_square = 0.5 * step**2
+
+    position = slice(0, 2)
+    velocity = slice(2, 4)
+    acceleration = slice(4, 6)
+    transitions = np.tile(np.eye(6), (len(h), 1, 1))
+    transitions[:, position, velocity] = step * rotation
+    transitions[:, position, acceleration] = half_square * rotation
+    transitions[:, velocity, acceleration] = step * np.eye(2)
+    return transitions
+
+
+def _midpoints(values: Floats) -> Floats:
+    """Means of each value and the next."""
+    return 0.5 * (values[1:] + values[:-1])
 
 
 def _smoothed(trial: Trial, names: Sequence[str], motion: Motion) -> dict[str, Floats]:
@@ -225,10 +242,13 @@ def _smoother(motion: Motion, found: _Filtered) -> Floats:
     Source: Rauch, Tung & Striebel 1965, AIAA Journal 3(8).
     """
     states = found.states.copy()
-    for k in reversed(range(len(states) - 1)):
+    last = len(states) - 1
+    for k in reversed(range(last)):
+        following = k + 1
         moved = motion.transitions[k] @ found.covariances[k]
-        gain = np.linalg.solve(found.predicted_covariances[k + 1], moved).T
-        surprise = states[k + 1] - found.predicted[k + 1]
+        before = found.predicted_covariances[following]
+        gain = np.linalg.solve(before, moved).T
+        surprise = states[following] - found.predicted[following]
         states[k] += gain @ surprise
     return states
 
