@@ -16,8 +16,8 @@ from typing import Any
 from griffe import Docstring, DocstringSectionKind
 
 from identification.models.methods import METHODS, make_method, method_options
-from identification.pipeline.options import Options
-from identification.pipeline.reading import ARGUMENTS, STAGES, WORDS, full_name
+from identification.pipeline.options import STAGES, Options
+from identification.pipeline.reading import ARGUMENTS, WORDS, full_name
 
 PAGE = Path(__file__).parents[1] / "docs" / "identification.md"
 MARKS = re.compile(r"<!-- options: (.+?) -->\n.*?<!-- end of options -->", re.DOTALL)

@@ -1,8 +1,8 @@
 """The options of `identify`, and how provenance and settings.json record them."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass
-from typing import Any, TypeVar
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, fields, is_dataclass
+from typing import Any
 
 import numpy as np
 
@@ -26,12 +26,22 @@ DEFAULT_METHOD = "tls-svm"
 MAP = "map"  # the method of the MMG form: maximum a posteriori
 AUTO = "auto"  # the structure that is chosen by trials held out
 
-Stage = TypeVar("Stage")
+#: Stages of an identification that are one object each.
+STAGES: dict[str, type] = {
+    "samples": Sampling,
+    "preprocessing": Preprocessing,
+    "kernel": KernelResidual,
+    "prior": PriorKnowledge,
+    "uncertainty": Uncertainty,
+}
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class Options:
-    """The arguments of `identify` but for the trials, each stage as an object.
+    """The arguments of `identify` but for the trials.
+
+    A stage is an object, such as `samples=Sampling(window=3)`, or the word of a default
+    one, such as "spline".
 
     Parameters
     ----------
@@ -93,14 +103,15 @@ class Options:
 
     structure: str | Structure = "abkowitz"
     method: Any = DEFAULT_METHOD
-    samples: Sampling = field(default_factory=Sampling)
+    samples: Any = "spline"  # a Sampling once made, and so with the other stages
     particulars: Given = None
     steering: SteeringGear | None = None
-    preprocessing: Preprocessing = field(default_factory=Preprocessing)
+    _: KW_ONLY
+    preprocessing: Any = "spline"
     reference_model: str | ShipModel | None = None
-    kernel: KernelResidual | None = None
-    prior: PriorKnowledge | None = None
-    uncertainty: Uncertainty = field(default_factory=Uncertainty)
+    kernel: Any = None
+    prior: Any = None
+    uncertainty: Any = "analytic"
     current: str | Mapping[str, float] = "auto"
     wind: str | Mapping[str, Any] = "auto"
     rudder_bias: str = "auto"
@@ -110,6 +121,11 @@ class Options:
     service_shaft_speed: float | None = None
 
     def __post_init__(self) -> None:
+        for name, kind in STAGES.items():
+            value = getattr(self, name)
+            is_word = isinstance(value, str | ShipModel) or not is_dataclass(value)
+            if is_word and value is not None:
+                object.__setattr__(self, name, kind(value))
         if not isinstance(self.steering, SteeringGear | None):
             raise InputError(
                 "steering: expected a SteeringGear, or None to estimate it from the"
@@ -139,12 +155,6 @@ class Options:
     def method_is_default(self) -> bool:
         """Whether no method was asked for."""
         return isinstance(self.method, str) and self.method == DEFAULT_METHOD
-
-
-def stage(kind: Callable[[Any], Stage], value: Stage | Any) -> Stage:
-    """The object of a stage as given, or the one that a word or a model stands for."""
-    is_word = isinstance(value, str | ShipModel) or not is_dataclass(value)
-    return kind(value) if is_word else value
 
 
 def name_of(value: Any) -> str:

@@ -12,25 +12,12 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from identification.estimators.kernel_residual import KernelResidual
-from identification.judging.uncertainty import Uncertainty
 from identification.models.methods import METHODS, make_method, method_options
-from identification.models.prior_knowledge import PriorKnowledge
 from identification.models.refinement import Refinement
-from identification.pipeline.options import DEFAULT_METHOD, MAP, Options
-from identification.samples.preprocess import Preprocessing
-from identification.samples.samples import Sampling
+from identification.pipeline.options import DEFAULT_METHOD, MAP, STAGES, Options
 from shipgym import InputError
 from shipgym.checks import check_choice, check_table, check_text, did_you_mean, placed
 
-#: Stages of an identification that are one object each.
-STAGES: dict[str, type] = {
-    "samples": Sampling,
-    "preprocessing": Preprocessing,
-    "kernel": KernelResidual,
-    "prior": PriorKnowledge,
-    "uncertainty": Uncertainty,
-}
 #: The setting of each stage that its name alone stands for.
 WORDS = {name: fields(kind)[0].name for name, kind in STAGES.items()}
 WORDS["method"] = "name"
@@ -108,36 +95,31 @@ def full_name(name: str, where: str, with_kernel: bool = False) -> str:
 
     The message begins with `where`.
     """
-    if name in ARGUMENTS or name in WORDS:
-        return name
-    known = stage_settings()
-    if "." in name:
-        stage, _, setting = name.partition(".")
-        if setting == WORDS.get(stage):
-            return stage
-        if setting in known.get(stage, ()):
-            return name
-
-    owners = []
-    for stage, settings in known.items():
-        if name in settings:
-            owners.append(stage)
-        for setting in settings:
-            if name == f"{stage}_{setting}":
-                return f"{stage}.{setting}"
-    if len(owners) == 1:
-        return f"{owners[0]}.{name}"
-    if owners:
-        stage = "kernel" if with_kernel and "kernel" in owners else "method"
-        return f"{stage}.{name}"
-
-    names = [*ARGUMENTS, *WORDS]
-    for settings in known.values():
-        names += settings
-    hint = did_you_mean(name, names)
+    known = option_names(with_kernel)
+    if name in known:
+        return known[name]
+    hint = did_you_mean(name, known)
     raise InputError(
         f"{where} {name}: expected an option of identify, got an unknown one.{hint}"
     )
+
+
+def option_names(with_kernel: bool) -> dict[str, str]:
+    """Full names of options by every name that they may be given.
+
+    Of a setting that several stages have the name alone is that of the last: the method
+    or, with one, the kernel.
+    """
+    known = stage_settings()
+    last = "kernel" if with_kernel else "method"
+    alone, found = dict[str, str](), dict[str, str]()
+    for stage in sorted(known, key=lambda stage: stage == last):
+        found[f"{stage}.{WORDS[stage]}"] = stage
+        for setting in known[stage]:
+            full = f"{stage}.{setting}"
+            found |= {full: full, f"{stage}_{setting}": full}
+            alone[setting] = full
+    return alone | found | {name: name for name in (*ARGUMENTS, *WORDS)}
 
 
 def check_value(name: str, value: Any, method: Any = None) -> None:

@@ -18,9 +18,9 @@ from identification import (
     Uncertainty,
 )
 from identification.models.methods import METHODS, method_options
+from identification.pipeline.options import STAGES
 from identification.pipeline.reading import (
     ARGUMENTS,
-    STAGES,
     full_name,
     identify_arguments,
     read_table,
