@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -11,42 +12,39 @@ from sklearn.base import clone
 from identification.estimators.adapted import Adapted
 from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.linear import LinearRegressor
-from identification.estimators.lssvm import (
-    LSSVM,
-    LeastSquares,
-    RidgeRegression,
-    TruncatedLSSVM,
-)
-from identification.estimators.recursive import (
-    MultiInnovationLeastSquares,
-    RecursiveLeastSquares,
-    StochasticGradient,
-)
-from identification.estimators.rm_svm import RMSVM
-from identification.estimators.tuned import TunedLSSVM
+from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.models.refinement import Refinement
 from identification.samples.samples import Samples
 from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, quoted
 
-#: By name the class of an estimator, or of a refinement, and its settings.
-METHODS: dict[str, tuple[Any, dict[str, Any]]] = {
-    "ls": (LeastSquares, {}),
-    "ridge": (RidgeRegression, {}),
-    "ls-svm": (LSSVM, {}),
-    "tls-svm": (TruncatedLSSVM, {}),
-    "cv-lssvr": (TunedLSSVM, {"optimiser": "grid"}),
-    "pso-lssvr": (TunedLSSVM, {"optimiser": "pso"}),
-    "abc-lssvr": (TunedLSSVM, {"optimiser": "abc"}),
-    "rls": (RecursiveLeastSquares, {}),
-    "sg": (StochasticGradient, {}),
-    "nisg": (StochasticGradient, {"omega": 0.5}),
-    "mils": (MultiInnovationLeastSquares, {"inverse_free": False}),
-    "tmils": (MultiInnovationLeastSquares, {}),
-    "output-error": (Refinement, {}),
-    "rm-svm": (RMSVM, {}),
+#: By name the class of an estimator in `identification.estimators`, or `Refinement`,
+#: and its settings.
+METHODS: dict[str, tuple[str, dict[str, Any]]] = {
+    "ls": ("lssvm.LeastSquares", {}),
+    "ridge": ("lssvm.RidgeRegression", {}),
+    "ls-svm": ("lssvm.LSSVM", {}),
+    "tls-svm": ("lssvm.TruncatedLSSVM", {}),
+    "cv-lssvr": ("tuned.TunedLSSVM", {"optimiser": "grid"}),
+    "pso-lssvr": ("tuned.TunedLSSVM", {"optimiser": "pso"}),
+    "abc-lssvr": ("tuned.TunedLSSVM", {"optimiser": "abc"}),
+    "rls": ("recursive.RecursiveLeastSquares", {}),
+    "sg": ("recursive.StochasticGradient", {}),
+    "nisg": ("recursive.StochasticGradient", {"omega": 0.5}),
+    "mils": ("recursive.MultiInnovationLeastSquares", {"inverse_free": False}),
+    "tmils": ("recursive.MultiInnovationLeastSquares", {}),
+    "output-error": ("Refinement", {}),
+    "rm-svm": ("rm_svm.RMSVM", {}),
 }
+
+
+def _kind(name: str) -> Any:
+    """The class of a method, whose module is imported when it is asked for."""
+    module, _, kind = METHODS[name][0].rpartition(".")
+    if not module:
+        return Refinement
+    return getattr(import_module(f"identification.estimators.{module}"), kind)
 
 
 def fit_all(make: Callable[[], Estimator], samples: Samples) -> Estimators:
@@ -163,7 +161,7 @@ def without_constant(estimator: Any) -> Estimator:
 
 def method_options(name: str) -> tuple[str, ...]:
     """Names of the settings that a method of `METHODS` has."""
-    kind, _ = METHODS[name]
+    kind = _kind(name)
     own: tuple[str, ...] = kind.options
     if kind is Refinement:
         return (*own, *TruncatedLSSVM.options)
@@ -185,9 +183,9 @@ def make_method(name: str, settings: Mapping[str, Any] | None = None) -> Any:
                 " that it does not know; leave it out, or choose the method that it is"
                 " for"
             )
-    kind, usual = METHODS[name]
+    kind = _kind(name)
     if kind is not Refinement:
-        return kind(**{**usual, **settings})
+        return kind(**{**METHODS[name][1], **settings})
 
     own = {}
     of_start = {}
