@@ -139,19 +139,12 @@ def _opened(path: Path, what: str) -> Iterator[BinaryIO]:
         ) from None
 
 
-def read_text(path: Path, what: str, largest: int, latin: bool = False) -> str:
-    """Read UTF-8 text as `read_bytes` does; InputError names the line that is not.
-
-    With `latin`, other bytes are read as Latin-1, as instruments write the sign of
-    degrees, unless they are control characters there, or those of UTF-16 and of memory
-    that was never written.
-    """
+def read_text(path: Path, what: str, largest: int) -> str:
+    """Read UTF-8 text as `read_bytes` does; InputError names the line that is not."""
     data = read_bytes(path, what, largest)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        if latin and not re.search(rb"[\x80-\x9f\xfe\xff\0]", data):
-            return data.decode("latin-1")
         raise _not_utf_8(path, what, data, error.start) from None
 
 

@@ -1,7 +1,6 @@
 """From a log to a ship file and a page, in commands that say what they guessed."""
 
 import csv
-import json
 import shutil
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import numpy as np
 import pytest
 
 from agents.cli import main
-from shipgym.trials.guesses import guess_columns, guess_trial
+from shipgym.trials.guesses import guess_columns
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.ship_file import ShipFile
 
@@ -98,18 +97,6 @@ def test_a_log_beside_others_that_cannot_be_read_is_told(log, monkeypatch, capsy
     assert "warning: lag.csv: there is no such log. Did you mean 'log.csv'?" in said
 
 
-def test_a_log_that_does_not_tell_the_rudders_sign_leaves_it_to_the_others(
-    log, monkeypatch, capsys
-):
-    rows = (log / "log.csv").read_text().splitlines()
-    straight = [rows[0], *(f"{row.rsplit(';', 1)[0]};0,0" for row in rows[1:60])]
-    (log / "straight.csv").write_text("\n".join(straight))
-    code, said = command(
-        monkeypatch, capsys, "new-ship", "straight.csv", "log.csv", "--length", "150"
-    )
-    assert (code, "a positive rudder steers to port" in said) == (0, True)
-
-
 EXAMPLE = Path(__file__).parents[2] / "examples" / "mariner" / "zigzag_10_10.csv"
 OF_EXAMPLE = {
     "time_s": "t",
@@ -147,20 +134,6 @@ def test_every_column_of_the_examples_log_is_recognised_in_its_unit(
         assert np.array_equal(trial[name], given[name])
 
 
-def test_columns_that_are_not_used_are_listed(log, monkeypatch, capsys):
-    text = EXAMPLE.read_text().replace("compass_deg", "bearing", 1)
-    (log / "run.csv").write_text(text.replace("log_ahead_kn", "log one", 1))
-    code, said = command(
-        monkeypatch, capsys, "new-ship", "run.csv", "--length", "160.9"
-    )
-    assert (code, "columns not used: 'bearing', 'log one'" in said) == (0, True), said
-    assert "r: column 'gyro_deg_s'" in said
-    assert "# not used: 'bearing', 'log one'\n" in (log / "ship.toml").read_text()
-    (log / "ship.toml").unlink()
-    _, said = command(monkeypatch, capsys, "new-ship", "run.csv", "--json")
-    assert json.loads(said)["unused"] == ["bearing", "log one"]
-
-
 @pytest.mark.parametrize(
     ("name", "channel", "unit"),
     [
@@ -187,23 +160,6 @@ def test_a_name_is_a_channels_where_its_unit_is_one_of_it(name, channel, unit):
     )
 
 
-@pytest.mark.parametrize(
-    ("name", "largest", "unit"),
-    [
-        ("time_s", 1.7e9, "unix"),
-        ("time_s", 1e3, "s"),
-        ("time unix ms", 1.7e12, "unix ms"),
-        ("time", 1.7e12, "unix ms"),
-        ("t_ms", 5e8, "ms"),
-    ],
-)
-def test_times_since_1970_are_known_by_their_name_and_size(name, largest, unit):
-    (found,) = guess_columns(
-        LogTable(Path("log"), {name: np.array([largest] * 3)}, range(3))
-    )
-    assert found.unit == unit
-
-
 def test_the_unit_that_a_check_names_is_tried_and_written(log, monkeypatch, capsys):
     example(log)
     code, said = command(
@@ -217,20 +173,6 @@ def test_the_unit_that_a_check_names_is_tried_and_written(log, monkeypatch, caps
     )
     (trial,) = ShipFile.load(log / "ship.toml").trials()
     assert np.abs(trial["r"]).max() == pytest.approx(np.radians(0.637))
-
-
-def test_time_in_milliseconds_is_tried_and_a_unit_in_a_name_is_kept(log):
-    def late(row):
-        return {**row, "t": f"{1000.0 * float(row['t']):g}"}
-
-    found = guess_trial(example(log, late))
-    assert {one.channel: one.unit for one in found.columns}["t"] == "ms"
-    assert found.trial.duration == 440.0
-    example(log, lambda row: {**row, "r_deg_min": row["r"], "r": ""})
-    text = (log / "run.csv").read_text().replace("t,psi,r,", "t,psi,spare,", 1)
-    (log / "run.csv").write_text(text)
-    (decision,) = guess_trial(log / "run.csv").decisions
-    assert 'declare r = { column = "r_deg_min", unit = "deg/s" }' in decision.choices
 
 
 def test_blank_cells_are_filled_and_the_ship_file_says_so(log, monkeypatch, capsys):

@@ -10,14 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shipgym import files
-from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
+from shipgym.errors import InputError
 from shipgym.files import (
     named_values,
     parse_json,
     parse_toml,
     read_bytes,
     read_json,
-    read_text,
     read_toml,
     toml_value,
 )
@@ -142,30 +141,6 @@ def test_a_file_larger_than_its_kind_may_be_is_not_read(tmp_path):
     assert read_bytes(path, "file", 2**18 + 1) == path.read_bytes()
 
 
-def test_a_sign_of_degrees_is_read_in_either_encoding_and_memory_as_none(tmp_path):
-    path = tmp_path / "log.csv"
-    for content in ("rudder (°)\n", "\ufeffrudder (°)\n"):
-        path.write_text(content, encoding="utf-8")
-        assert read_text(path, "x", 100) == "rudder (°)\n"
-    path.write_bytes(b"t\nrudder (\xb0)\n")
-    assert read_text(path, "x", 100, latin=True) == "t\nrudder (°)\n"
-    expected = "log.csv: line 2: expected a x in UTF-8, got byte 0xb0"
-    assert expected in refusal(read_text, path, "x", 100)
-    path.write_bytes(b"t\nrudder (\xb0)\n\xff\xff")
-    assert expected in refusal(lambda: read_text(path, "x", 100, latin=True))
-
-
-def test_a_file_in_utf_16_is_refused_by_name(tmp_path):
-    for encoding in ("utf-16-le", "utf-16-be"):
-        (tmp_path / "a.toml").write_bytes("\ufeff[ship]\n".encode(encoding))
-        for latin in (False, True):
-            message = refusal(read_text, tmp_path / "a.toml", "ship file", 100, latin)
-            assert message.endswith(
-                "a.toml: expected a ship file in UTF-8, got UTF-16; save it as text in"
-                " UTF-8"
-            )
-
-
 @pytest.mark.parametrize("length", [2000, 2006, 100_000])
 def test_the_middle_of_a_message_is_left_out_beyond_two_thousand_characters(length):
     text = "a" * 1000 + "m" * (length - 2000) + "b" * 1000
@@ -211,34 +186,3 @@ PAGE = Path(__file__).parents[2] / "docs" / "ship_file.md"
 )
 def test_limits_are_those_of_their_page(row):
     assert row in PAGE.read_text(encoding="utf-8")
-
-
-def test_a_json_file_holds_one_object(tmp_path):
-    path = tmp_path / "model.json"
-    path.write_text('{"a": [1, 2]}')
-    assert read_json(path, "model file", "x") == {"a": [1, 2]}
-    path.write_text("[1, 2]")
-    said = refusal(read_json, path, "model file", "x")
-    assert said == f"{path}: expected a table of keys and values, got [1, 2]"
-
-
-def test_of_a_missing_file_the_nearest_name_beside_is_asked_for(tmp_path):
-    (tmp_path / "mariner.json").write_text("{}")
-    said = refusal(read_bytes, tmp_path / "marinr.json", "model file", 9)
-    assert said.endswith("no such model file. Did you mean 'mariner.json'?")
-    said = refusal(read_bytes, tmp_path / "x", "model file", 9)
-    assert said.endswith("x: there is no such model file.")
-
-
-def test_a_file_is_looked_at_without_reading_it(tmp_path):
-    (tmp_path / "large.csv").write_bytes(b"0" * 1000)
-    files.check_readable(tmp_path / "large.csv", "CSV file")
-    said = refusal(files.check_readable, tmp_path, "CSV file")
-    assert said.endswith("expected a CSV file, got a folder")
-
-
-def test_errors_of_a_simulation_carry_what_was_there():
-    error = UnstableModelError("runs away", 12.5, {"u": 9.0})
-    assert (str(error), error.time_s, error.state) == ("runs away", 12.5, {"u": 9.0})
-    error = ManoeuvreError("never turned", "the trial so far")
-    assert (str(error), error.trial) == ("never turned", "the trial so far")

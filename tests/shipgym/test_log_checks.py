@@ -178,6 +178,12 @@ def test_a_current_is_what_speed_over_ground_has_more_than_the_log(
     assert "0.54 m/s (1.05 kn) toward 338 deg, 0.00 m/s" in " ".join(trial.notes)
 
 
+def test_a_track_over_the_date_line_has_no_jump(tmp_path):
+    lon = (179.995 + 5e-5 * T + 180.0) % 360.0 - 180.0
+    path = written(tmp_path / "run.csv", t=T, lat=V - 17.0, lon=lon, psi=V + 1.57)
+    np.testing.assert_allclose(np.diff(Trial.from_csv(path)["y"]), 5.32, atol=0.01)
+
+
 def test_a_heading_follows_from_its_rate_where_there_is_no_position(tmp_path):
     t = np.arange(9.0)
     trial = Trial.from_csv(written(tmp_path / "run.csv", t=t, r=0.01 + 0.01 * t))

@@ -82,10 +82,6 @@ def test_a_seed_replays_and_sensors_do_not_disturb_each_other(zigzag):
     assert np.corrcoef(first["x"] - zigzag["x"], first["y"] - zigzag["y"])[0, 1] < 0.9
 
 
-def test_perfect_sensors_change_nothing(zigzag):
-    assert Sensors({}).measure(zigzag).sha256 == zigzag.sha256
-
-
 def test_the_logger_samples_the_trial_and_orders_stay_orders(zigzag):
     measured = Sensors({}, sampling_s=0.25).measure(zigzag)
     np.testing.assert_allclose(np.diff(measured.t), 0.25)
@@ -107,50 +103,6 @@ def test_instruments_feel_the_motion_in_waves_and_the_weather_is_not_logged():
     np.testing.assert_allclose(logged["psi"], 0.1 * t + np.cos(t))
 
 
-def test_a_sea_trial_has_instruments_for_roll_as_for_yaw():
-    """Gyros of 0.02 deg/s, angles to 0.1 deg; the shaft is counted to a tenth of a turn
-    a minute."""
-    degree = np.radians(1.0)
-    noise = {name: sensor.noise for name, sensor in SEA_TRIAL.items() if sensor.noise}
-    assert noise == pytest.approx(
-        {
-            "x": 0.3,
-            "y": 0.3,
-            "psi": 0.1 * degree,
-            "phi": 0.1 * degree,
-            "r": 0.02 * degree,
-            "p": 0.02 * degree,
-            "u": 0.03,
-            "v": 0.02,
-        }
-    )
-    steps = {
-        name: sensor.resolution
-        for name, sensor in SEA_TRIAL.items()
-        if sensor.resolution
-    }
-    assert steps == pytest.approx({"delta": 0.1 * degree, "n": 0.1 / 60.0})
-    assert Sensor() == Sensor(drift_time_s=300.0)
-    assert Sensors().dropout_samples == 3.0
-
-
-def test_a_sensor_may_err_always_and_a_gap_be_of_one_sample(still):
-    always = Sensors(
-        {"v": Sensor(outlier_probability=1.0, outlier_size=1.0)}, dropout_samples=1.0
-    )
-    assert np.count_nonzero(always.measure(still)["v"]) == N
-    with pytest.raises(InputError, match=r"outlier_probability: .*1\.01"):
-        Sensor(outlier_probability=1.01)
-
-
-def test_sensors_do_not_change_with_the_mapping_that_they_were_given(zigzag):
-    given = {"r": SEA_TRIAL["r"]}
-    sensors = Sensors(given)
-    before = sensors.measure(zigzag)
-    given["r"] = Sensor(noise=1.0)
-    assert sensors.measure(zigzag).sha256 == before.sha256
-
-
 def test_a_sea_trial_still_tells_the_overshoot(zigzag):
     """6 degrees of overshoot, read through the sensors of a sea trial at 2 Hz, are
     right to a few tenths."""
@@ -165,26 +117,13 @@ def test_a_sea_trial_still_tells_the_overshoot(zigzag):
     ("make", "message"),
     [
         (lambda t: Sensor(noise=-1.0), "sensor noise: .*-1"),
-        (lambda t: Sensor(outlier_probability=2.0), "outlier_probability: .*2"),
         (lambda t: Sensor(drift=1.0, drift_time_s=0.0), "drift_time_s: .*0"),
         (lambda t: Sensors({"speed": Sensor()}), "unknown channel 'speed'"),
         (lambda t: Sensors({"u": 0.1}), "u: expected a Sensor, got 0.1"),
-        (lambda t: Sensors(sampling_s=-1.0), "sampling_s: .*-1"),
         (
             lambda t: Sensors(sampling_s=500.0).measure(t),
             "sampling_s: expected at most half of the 600 s",
         ),
-        (lambda t: Sensor(drift_time_s=0.0), "sensor drift_time_s: .*0"),
-        (
-            lambda t: Sensors(dropout_samples=0.99),
-            "sensors dropout_samples: .*0.99",
-        ),
-        (lambda t: Sensors(sampling_s=0.0), "sensors sampling_s: .*0"),
-        (
-            lambda t: Sensors(dropout_probability=-0.1),
-            "sensors dropout_probability: .*-0.1",
-        ),
-        (lambda t: Sensors(dropout_probability=1.0), "dropout_probability: .*1"),
         (
             lambda t: Sensors(dropout_probability=0.999, dropout_samples=1e5).measure(
                 t

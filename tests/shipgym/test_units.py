@@ -5,11 +5,8 @@ from scipy import constants
 
 from shipgym.errors import InputError
 from shipgym.trials.units import (
-    CHANNELS,
-    INPUTS,
     QUANTITIES,
     UNITS,
-    check_channel,
     si_factor,
     si_unit,
 )
@@ -78,25 +75,3 @@ def test_units_are_what_they_are_by_definition(channel, units):
         match=(rf"columns: expected a unit of {QUANTITIES[channel]} .*, got 'furlong'"),
     ):
         si_factor(channel, "furlong", "columns")
-
-
-def test_a_unit_of_another_quantity_is_told():
-    with pytest.raises(
-        InputError, match=r"got 'deg/s'. 'deg/s' is a unit of angular rate"
-    ):
-        si_factor("psi", "deg/s")
-    with pytest.raises(InputError, match=r"got 'knot'. Did you mean 'knots'\?"):
-        si_factor("u", "knot")
-
-
-def test_a_trial_has_no_time_among_its_channels_and_nothing_that_only_files_have():
-    assert set(QUANTITIES) - set(CHANNELS) == {"t", *INPUTS}
-    assert check_channel("t", "columns") == "t"
-    assert check_channel("sog", "columns") == "sog"
-    for name in ("t", "sog"):
-        with pytest.raises(InputError, match=f"trial: unknown channel '{name}'"):
-            check_channel(name, "trial", time=False)
-    with pytest.raises(
-        InputError, match=r"unknown channel 'deltta'. Did you mean 'delta'\?"
-    ):
-        check_channel("deltta", "columns")

@@ -5,7 +5,6 @@ import errno
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -17,7 +16,7 @@ from shipgym.drafts import (
     remove_drafts,
 )
 from shipgym.errors import InputError
-from shipgym.files import make_folder, write_json, write_text
+from shipgym.files import make_folder, write_text
 
 WEEK = 7 * 86400
 
@@ -105,15 +104,6 @@ def test_what_cannot_be_a_file_is_refused_and_stays(path):
     assert Path("/dev/null").is_char_device()
 
 
-def test_a_folder_is_made_with_those_above_it_and_may_be_there(tmp_path):
-    for _ in range(2):
-        make_folder(tmp_path / "runs" / "first")
-    assert (tmp_path / "runs" / "first").is_dir()
-    write_text("a file", tmp_path / "file")
-    with pytest.raises(InputError, match="file/first: no folder can be made there"):
-        make_folder(tmp_path / "file" / "first")
-
-
 def test_a_refusal_gives_the_reason_of_the_system_in_words(tmp_path):
     with pytest.raises(InputError) as caught:
         write_text("text", tmp_path / "none" / "a")
@@ -134,13 +124,6 @@ def test_a_refusal_gives_the_reason_of_the_system_in_words(tmp_path):
         make_folder(tmp_path / "file" / "first")
 
 
-def test_json_is_written_with_a_space_a_level_and_an_end_of_line(tmp_path):
-    write_json({"a": {"b": 1}}, tmp_path / "a.json")
-    assert (tmp_path / "a.json").read_text() == '{\n "a": {\n  "b": 1\n }\n}\n'
-    write_json({"a": [1, 2]}, tmp_path / "a.json", indent=None)
-    assert (tmp_path / "a.json").read_text() == '{"a": [1, 2]}\n'
-
-
 def test_a_folder_is_removed_unless_it_was_renamed(tmp_path, dead):
     left = draft(tmp_path / "result", dead)
     with draft_folder(tmp_path / "result") as folder:
@@ -152,35 +135,3 @@ def test_a_folder_is_removed_unless_it_was_renamed(tmp_path, dead):
     with pytest.raises(ZeroDivisionError), draft_folder(tmp_path / "other") as folder:
         (folder / "half").write_text(str(1 / 0))
     assert [path.name for path in tmp_path.iterdir()] == ["result"]
-
-
-def test_a_draft_is_abandoned_where_the_system_knows_no_process_of_its_number(
-    tmp_path, monkeypatch, dead
-):
-    own, lost, none = (
-        draft(tmp_path / "a", number) for number in (os.getpid(), dead, 10**30)
-    )
-    elsewhere = draft(tmp_path / "b", dead, "00000000")
-    assert own.exists()
-    assert elsewhere.exists()
-    assert sorted(abandoned_drafts(tmp_path)) == sorted([lost, none])
-
-    def refused(*_):
-        raise PermissionError  # of another user's, which is alive
-
-    monkeypatch.setattr(os, "kill", refused)
-    assert abandoned_drafts(tmp_path) == []
-
-
-def test_drafts_of_this_computer_and_of_others_count_as_abandoned_after_a_week(
-    tmp_path,
-):
-    living, elsewhere = (
-        draft(tmp_path / "a", os.getpid()),
-        draft(tmp_path / "b", 1, "00000000"),
-    )
-    for age, expected in ((WEEK - 60, []), (WEEK + 60, [living, elsewhere])):
-        for path in (living, elsewhere):
-            os.utime(path, (time.time() - age,) * 2)
-        assert sorted(abandoned_drafts(tmp_path)) == expected
-    assert abandoned_drafts(tmp_path / "none") == []
