@@ -49,8 +49,8 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
     p = bridge_parameters(agent)
     name = checked_name(name or agent.name)
     c = Translator({}, name)
-    is_policy = isinstance(agent, LearnedPolicy)
-    data = policy_data(c, agent, p) if is_policy else controller_data(c, agent, p)
+    data_of = policy_data if isinstance(agent, LearnedPolicy) else controller_data
+    data = data_of(c, agent, p)
     title = f"Autopilot '{agent.name}' for model '{agent.model_name}'"
     data |= {
         "title": comment(title),
@@ -62,11 +62,10 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
         "structures": c.structures.texts,
         "functions": c.functions,
     }
-    template = "policy.c.j2" if is_policy else "autopilot.c.j2"
     return Source(
         name=name,
         header=render("autopilot.h.j2", name, **data),
-        source=c_source(template, name, **data),
+        source=c_source("autopilot.c.j2", name, **data),
         inputs=inputs,
         outputs=AUTOPILOT_OUTPUTS,
         step=p.dt,
@@ -74,7 +73,6 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
         title=title,
         sha256=data["sha256"],
         parameters=tunable(c, agent, p),
-        tables=tuple(leaf_paths(kind_of(p), tables=True)),
     )
 
 
@@ -100,7 +98,7 @@ def controller_data(c: Translator, agent: Any, p: BridgeParameters) -> dict[str,
     return {
         "policy": None,
         "state_structures": header,
-        "own_paths": leaf_paths(state),
+        "state_paths": leaf_paths(state, "own."),
         "step": step.name,
         "step_type": structures.type(step.returns),
         "parameters": structures.initialiser(kind, numbers_of(p)),
@@ -130,14 +128,16 @@ def policy_data(
         states["base"] = state_kind(policy.base)
     kind, header = declared(c, p, **states)
 
+    state_paths = []
+    for name, part in states.items():
+        state_paths += leaf_paths(part, f"{name}.")
     observe = c.function(policy_observations, BridgeInput, own, kind)
     finish = c.function(limited, float, own, kind)
     data = {
         "policy": policy,
         "state_structures": header,
         "has_base": policy.base is not None,
-        "own_paths": leaf_paths(own),
-        "base_paths": leaf_paths(states.get("base", Nothing)),
+        "state_paths": state_paths,
         "observe": observe.name,
         "observe_type": structures.type(observe.returns),
         "own_observations_type": structures.type(OwnObservations),

@@ -216,14 +216,14 @@ def record_kind(name: str, kinds: Mapping[str, Kind], noted: Kind = None) -> Kin
     return record
 
 
-def leaf_paths(kind: Kind, before: str = "", tables: bool = False) -> list[str]:
-    """Paths of all numbers of a record, such as `law.gains.sway`, or of its tables."""
+def leaf_paths(kind: Kind, before: str = "") -> list[str]:
+    """Paths of all numbers of a record, such as `law.gains.sway`."""
     paths = []
     for name, part in members(kind).items():
         path = f"{before}{name}"
         if is_record(part):
-            paths += leaf_paths(part, f"{path}.", tables)
-        elif is_table(part) == tables:
+            paths += leaf_paths(part, f"{path}.")
+        elif part in NUMBERS:
             paths.append(path)
     return paths
 

@@ -119,8 +119,12 @@ def ship_source(
     longest = LONGEST_STEP * model.travel_time
     weather, note = _weather(model, water_depth)
     numbers = [*model.ship_numbers(water_depth, longest), *weather]
-    inputs = _inputs(model, windy=not note)
-    outputs = _outputs(model)
+    without = {"wind_speed", "wind_from"} if note else set()
+    if "n" not in model.command_names:
+        without.add("shaft")
+    inputs = _started(model, SHIP_INPUTS.keys() - without, SHIP_INPUTS)
+    shown = {*model.state_names, *model.command_names}
+    outputs = _started(model, shown, SHIP_STATES)
     c = Translator({**model.compiled.hooks(), **OPEN_SEA.functions}, name)
     c.structures.labels |= coefficient_labels(model)
     kind = record_kind(
@@ -156,7 +160,6 @@ def ship_source(
         title=title,
         sha256=model_hash(model),
         parameters=_tunable(c, model, kind, numbers),
-        tables=tuple(leaf_paths(kind, tables=True)),
         notes=(note,) if note else (),
     )
 
@@ -242,27 +245,13 @@ def _start(model: ShipModel) -> dict[str, float]:
     return {"n": shaft, "shaft": shaft, **dict(states)}
 
 
-def _inputs(model: ShipModel, windy: bool) -> Variables:
-    """Inputs that have an effect on a ship, with their values at the beginning."""
-    without = set() if windy else {"wind_speed", "wind_from"}
-    if "n" not in model.command_names:
-        without.add("shaft")
-    return _started(model, SHIP_INPUTS.keys() - without, SHIP_INPUTS)
-
-
-def _outputs(model: ShipModel) -> Variables:
-    """States that a ship has or is ordered, with their values at the beginning."""
-    return _started(model, {*model.state_names, *model.command_names}, SHIP_STATES)
-
-
 def _started(model: ShipModel, names: set[str], variables: Variables) -> Variables:
     """Variables of these names, with their values at the beginning."""
     start = _start(model)
     started = {}
     for name, variable in variables.items():
         if name in names:
-            value = start.get(name, 0.0)
-            started[name] = variable._replace(start=value)
+            started[name] = variable._replace(start=start.get(name, 0.0))
     return started
 
 

@@ -47,8 +47,6 @@ class Source:
         Hash of the model's numbers.
     parameters : tuple of Parameter
         Numbers that may be set while it runs.
-    tables : tuple of str
-        Paths of the tables among the parameters.
     notes : tuple of str
         What was left out, and why.
     """
@@ -63,7 +61,6 @@ class Source:
     title: str
     sha256: str
     parameters: tuple[Parameter, ...] = ()
-    tables: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
 

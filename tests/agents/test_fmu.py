@@ -241,10 +241,6 @@ WRONG = {
     ),
     "backwards": (lambda u, k: u.doStep(0.0, -1.0), "expected a finite time.*got 0 s"),
     "integer": (lambda u, k: u.getInteger([1]), "fmi2GetInteger: this FMU does not"),
-    "foreign state": (
-        lambda u, k: u.deSerializeFMUstate(b"12"),
-        "state: expected .* bytes, got 2",
-    ),
     "another": (lambda u, k: u.refused(), "token: expected .*got another; the model"),
     "lost": (
         lambda u, k: (u.setReal([k["u"].valueReference], [900.0]), u.doStep(0.0, 1.0)),
