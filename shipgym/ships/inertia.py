@@ -32,11 +32,6 @@ def inertia(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
 
 def rigid_inertia(model: ManoeuvringModel) -> tuple[float, float, float]:
     """Mass, kg, static moment, kg m, and yaw inertia, kg m2, about midship."""
-    c = model.coefficients
-    if model.structure == "container":
-        unit = _mass_unit(model.particulars.completed())
-        L = model.particulars.length
-        return c["m"] * unit, 0.0, c["Iz"] * unit * L**2
     p = model.particulars.completed()
     mass = p.require("mass")
     xg = p.require("xg")
@@ -63,19 +58,10 @@ def _with_arms(prime: Floats, p: Particulars) -> Floats:
 def _container(model: ManoeuvringModel) -> Floats:
     """Son & Nomoto 1981; the added mass in sway acts above the centre (roll)."""
     c = model.coefficients
-    L = model.particulars["length"]
-    surge = c["m"] + c["mx"]
-    sway = c["m"] + c["my"]
-    sway_to_yaw = c["my"] * c["alpha_y"] * L
-    sway_to_roll = -c["my"] * c["ly"] * L
-    yaw = (c["Iz"] + c["Jz"]) * L * L
-    prime = [
-        [surge, 0.0, 0.0, 0.0],
-        [0.0, sway, sway_to_yaw, sway_to_roll],
-        [0.0, sway_to_yaw, yaw, 0.0],
-    ]
-    unit = _mass_unit(model.particulars.completed())
-    return unit * np.array(prime)
+    p = model.particulars.completed()
+    mass = particulars_inertia(p)
+    mass[1, 3] = -c["my"] * c["ly"] * p.length * _mass_unit(p)
+    return mass
 
 
 def _mmg(model: ManoeuvringModel) -> Floats:
