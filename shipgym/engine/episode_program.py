@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
 
-from shipgym.engine import episodes, sailing, stages, tiles
+from shipgym.engine import episodes, hooks, sailing, stages, tiles
 from shipgym.engine.annotations import ObservationSpec
 from shipgym.engine.compiled_ship import CompiledSea, CompiledShip
 from shipgym.engine.compiling import compiled, plain_python
@@ -37,8 +37,6 @@ class EpisodeProgram:
     sensors : shipgym.instruments.sensor_set.SensorSet
     shared : bool
         Whether all lanes have the same ship and sea.
-    current : callable or None
-        `current(x, y, settings)`, of a current that differs from place to place.
     """
 
     ship: CompiledShip
@@ -46,7 +44,6 @@ class EpisodeProgram:
     task: Any
     sensors: Any
     shared: bool
-    current: Any = None
 
     @cached_property
     def state_rows(self) -> Layout:
@@ -144,8 +141,8 @@ class EpisodeProgram:
             **self.ship.hooks(shared=self.shared),
             **self.ship.staged,
             **self.sea.functions,
-            "CURRENT_BY_PLACE": self.current is not None,
-            **({} if self.current is None else {"current_at": self.current}),
+            "CURRENT_BY_PLACE": self.task.current is not None,
+            "current_at": self.task.current or hooks.current_at,
         }
 
     def _task_hooks(self) -> dict[str, Any]:

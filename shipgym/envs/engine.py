@@ -103,7 +103,6 @@ class Engine(Lanes):
             task.definition,
             task.instruments(windy),
             len(own) == 1,
-            task.current,
         )
         contents = Contents(own, drawn, scale_task)
         super().__init__(program, model, task, num_envs, contents, threads)
@@ -332,7 +331,7 @@ class Engine(Lanes):
 
 def _any_weather(pool: Pool, task: Task) -> bool:
     """Return whether there is current, wind or waves in any episode."""
-    if task.current is not None:
+    if task.definition.current is not None:
         return True
     return any(not sea.calm for _, sea in pool)
 

@@ -39,7 +39,7 @@ def plain_loop(
         "measure": program.sensors.Memory,
         "readings": Readings,
     }
-    if program.current is not None:
+    if task.current is not None:
         forms["current_at"] = (float, float)
     checked = {name: _checked(program, name, form) for name, form in forms.items()}
     run = plain(episodes.run, {**program.hooks, **checked, **(hooks or {})})
@@ -53,7 +53,7 @@ def _checked(program: EpisodeProgram, name: str, form: Any) -> Callable[..., Any
     function = specialisation.copy(program.hooks[name])
     # of a task with another's reward, the function that differs from its own step
     names = function.__globals__
-    reward = names.get("reward_of_another") or names.get("current_of_file")
+    reward = names.get("reward_of_another")
     return partial(_result_of, function, reward, form)
 
 

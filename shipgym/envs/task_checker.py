@@ -163,7 +163,7 @@ def _numbers(
     numbers: dict[str, NDArray[Any]] = {}
     for path in engine.program.state_rows["task_state"].present:
         numbers[f"State.{path}"] = engine.read(path)
-    if engine.task.current is not None:
+    if engine.task.definition.current is not None:
         numbers["current: north"] = engine.read("current_north")
         numbers["current: east"] = engine.read("current_east")
     for name in engine.task.reward_parts:
@@ -183,7 +183,7 @@ def _source_of(name: str, task: Task) -> str:
     """File that a number comes from, for messages."""
     definition = task.definition
     if name.startswith("current"):
-        return place_of(task.current)
+        return place_of(definition.current)
     if name.startswith("reward_"):
         return definition.reward_source
     if task.sensors is None or not name.startswith("Observation."):

@@ -237,11 +237,6 @@ class Task:
         """Weather of the task, the first of several."""
         return self.seas[0]
 
-    @property
-    def current(self) -> Any:
-        """The task's current that differs from place to place, a function, or None."""
-        return self.definition.current
-
     def interval(self, model: ShipModel) -> float:
         """Control interval for a ship, s."""
         return control_interval(model) if self.dt is None else float(self.dt)
