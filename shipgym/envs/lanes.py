@@ -340,7 +340,7 @@ class Lanes:
             "model": self.model.name,
             "num_envs": self.num_envs,
             "rows": rows,
-            "numbers of the state": self._states.shape[1],
+            "size": self._states.shape[1],
         }
 
     def check_state(self, state: Mapping[str, Any]) -> None:

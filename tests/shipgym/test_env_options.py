@@ -203,7 +203,7 @@ def test_an_action_that_is_no_rudder_order_is_refused(wrong):
     env = make(action="rudder-discrete")
     env.reset(seed=0)
     with pytest.raises(
-        InputError, match="expected an integer from 0 to 8: a rudder order"
+        InputError, match="expected a member of Discrete\\(9\\): rudder orders"
     ):
         env.step(wrong)
 

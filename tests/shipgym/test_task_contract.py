@@ -155,14 +155,12 @@ def test_arrays_plan_and_random_numbers_are_the_same_for_one_ship_and_many(task)
 
 
 def test_settings_apply_until_the_next_reset(task):
-    rows = np.array([0.0, 1.0, 2.0])
-    speeds = np.array([[1.0, 1.0], [2.0, 3.0], [4.0, 5.0]])
+    options = {"bonus": 1.0, "speeds": [2.0, 3.0], "part": 0.25}
     many = gymnasium.make_vec(COURSE, num_envs=3, task=task)
     one = gymnasium.make(COURSE, task=task).unwrapped
-    many.reset(seed=2, options={"bonus": rows, "speeds": speeds, "part": 0.25})
+    many.reset(seed=2, options=options)
     of_many = sailed(many, 12)
     for row in range(3):
-        options = {"bonus": rows[row], "speeds": speeds[row], "part": 0.25}
         one.reset(seed=2 + row, options=options)
         assert one.physical_state()["u"] < 0.3 * one.model.particulars["speed"]
         for all_rows, alone in zip(of_many, sailed(one, 12), strict=True):
@@ -179,8 +177,7 @@ def test_settings_apply_until_the_next_reset(task):
         ({"bonsu": 1.0}, "options: unknown key 'bonsu'. Did you mean 'bonus'"),
         ({"speeds": [1.0, 2.0, 3.0]}, "speeds: expected 2 numbers"),
         ({"speeds": [1.0, 99.0]}, "speeds: number 1: expected a number <= 9"),
-        ({"bonus": [1.0, 2.0]}, "options: bonus: expected one value .* for each of 3"),
-        ({"bonus": [1.0, 2.0, "x"]}, "options: row 2: bonus: expected a number"),
+        ({"bonus": [1.0, 2.0]}, r"bonus: expected a number, got \[1.0, 2.0\]"),
     ],
 )
 def test_options_of_a_reset_are_checked(task, options, message):

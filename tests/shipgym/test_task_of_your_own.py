@@ -83,9 +83,9 @@ def test_spawned_workers_read_the_file(tmp_path):
     path = str(written(tmp_path, "fairway.py", FAIRWAY))
 
     def make():
-        import gymnasium
-
-        return gymnasium.make(COURSE, task=path, model="kvlcc2", action="rudder-shaft")
+        return gymnasium.make(
+            f"shipgym:{COURSE}", task=path, model="kvlcc2", action="rudder-shaft"
+        )
 
     workers = AsyncVectorEnv([make, make], context="spawn")
     try:
