@@ -18,7 +18,7 @@ from identification.judging.sampling import (
     sample,
 )
 from identification.judging.uncertainty import Uncertainty
-from identification.models.coefficient_prior import CoefficientPrior
+from identification.models.sailed import CoefficientPrior
 from identification.models.whole_trials import WholeTrials
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats

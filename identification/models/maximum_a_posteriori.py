@@ -80,7 +80,7 @@ def _chosen_model(posterior: Posterior, chosen: _Candidate) -> ShipModel:
     estimate, held_out = chosen
     widened = held_out.factor**2 * estimate.covariance
     model = posterior.model(estimate.z)
-    covariance = _coefficient_covariance(posterior.prior, widened)
+    covariance = _coefficient_covariance(posterior.mmg_prior, widened)
     return replace(model, covariance=covariance)
 
 
@@ -137,7 +137,7 @@ def _report(
         evaluations += estimate.evaluations
 
     best = chosen.estimate
-    return _prior_report(posterior.prior) | {
+    return _prior_report(posterior.mmg_prior) | {
         "prior_strength": best.strength,
         "errors_held_out": errors,
         "model_error": {

@@ -11,22 +11,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.arrays import by_name
-from identification.models.coefficient_prior import CoefficientPrior
 from identification.models.least_squares import (
     Linearised,
     fit_least_squares,
 )
 from identification.models.mmg_prior import MMGPrior
+from identification.models.sailed import CoefficientPrior, Sailed
 from identification.models.segments import Segment, compared_channels, cut
-from identification.models.shooting import (
-    channel_units,
-    in_all_lanes,
-    sail_lanes,
-)
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Flags, Floats, Integers
-from shipgym.engine.motion import Ship
 from shipgym.ships.mmg import IDENTIFIED
 
 LARGEST = 1e3  # residual of a ship that runs away, in scales
@@ -59,17 +52,7 @@ class _GroupErrors(NamedTuple):
     expected: float  # of that, by the covariance of the fit
 
 
-def least_scales(ship: ShipModel, channels: Sequence[str]) -> Floats:
-    """Least scales of errors by channel, SI units; of others that of the yaw rate.
-
-    Velocities by service speed U0, yaw rate by U0 / L, heading in rad.
-    """
-    least = {"u": 0.0017, "v": 0.0017, "r": 0.0021, "psi": np.radians(0.1)}
-    parts = np.array([least.get(name, least["r"]) for name in channels])
-    return np.asarray(parts * channel_units(ship, channels))
-
-
-class Posterior:
+class Posterior(Sailed):
     """Segments of trials and a prior, and the errors of ships of given coefficients.
 
     Coefficients are `z`, in standard deviations of the prior from its mean, shape
@@ -79,17 +62,20 @@ class Posterior:
     def __init__(
         self, blank: ShipModel, trials: Sequence[Trial], prior: MMGPrior
     ) -> None:
-        self.blank = replace(blank, coefficients=prior.mean)
-        self.prior = prior
-        self.mean = np.array([prior.mean[name] for name in IDENTIFIED])
-        self.channels = compared_channels(blank, trials)
-        self.floors = least_scales(blank, self.channels)
+        self.mmg_prior = prior
+        channels = compared_channels(blank, trials)
+        ship = replace(blank, coefficients=prior.mean)
+        names = list(ship.coefficients)
+        root = np.zeros((len(names), len(IDENTIFIED)))
+        root[: len(IDENTIFIED)] = np.diag(prior.deviation)
+        mean = np.array([prior.mean[name] for name in names])
+        super().__init__(ship, channels, CoefficientPrior(prior.source, mean, root))
         segment_lengths = 1.7  # of a segment, ship lengths at service speed
         sample_lengths = 0.067  # between the samples that are compared
         self.segments = cut(
             trials,
-            self.blank,
-            self.channels,
+            ship,
+            channels,
             segment_lengths,
             staggered=False,
             interval=sample_lengths,
@@ -103,18 +89,7 @@ class Posterior:
 
     def model(self, z: Floats) -> ShipModel:
         """The model of some coefficients."""
-        values = self.mean + z * self.prior.deviation
-        coefficients = self.prior.mean | by_name(IDENTIFIED, values)
-        return replace(self.blank, coefficients=coefficients)
-
-    @property
-    def coefficient_prior(self) -> CoefficientPrior:
-        """The prior of all coefficients; those known beforehand do not vary."""
-        names = list(self.blank.coefficients)
-        mean = np.array([self.prior.mean[name] for name in names])
-        root = np.zeros((len(names), len(IDENTIFIED)))
-        root[: len(IDENTIFIED)] = np.diag(self.prior.deviation)
-        return CoefficientPrior(self.prior.source, mean, root)
+        return self.blank.with_coefficients(self.prior.coefficients(z[None])[0])
 
     def errors(self, z: Floats, which: Integers) -> tuple[Floats, Floats]:
         """Errors of the simulated channels, and their slopes by z, of some segments.
@@ -124,11 +99,10 @@ class Posterior:
         """
         step = 1e-4  # standard deviations of the prior
         known = self._sailed_with(z)
-        missing = [index for index in which.tolist() if index not in known]
-        if missing:
-            ships = self._lanes(z, step)
-        for index in missing:
-            known[index] = self._weighted_errors(self.segments[index], ships)
+        ships = self.ships(np.vstack([z, z + step * np.eye(len(z))]))
+        for index in which.tolist():
+            if index not in known:
+                known[index] = self.errors_in(self.segments[index], ships)
         lanes = np.concatenate([known[index] for index in which.tolist()])
 
         errors = lanes[:, :, 0]
@@ -150,45 +124,6 @@ class Posterior:
             oldest = next(iter(self._sailed))
             del self._sailed[oldest]
         return known
-
-    def _weighted_errors(self, segment: Segment, ships: Floats) -> Floats:
-        """Errors of ships in a segment, by the root of their share."""
-        names = self.blank.state_names
-        columns = [names.index(name) for name in self.channels]
-        used = 1 + len(IDENTIFIED)
-        states = sail_lanes(
-            self.blank,
-            segment,
-            ships=ships,
-            starts=in_all_lanes(segment.start),
-        )
-        # at the first sample the ships have not moved yet
-        simulated = states[1:, columns, :used]
-        measured = segment.measured[1:, :, None]
-        off = simulated - measured
-        n_compared = len(off)
-        share = self.independent_errors(segment) / n_compared
-        return np.asarray(off * np.sqrt(share))
-
-    def _lanes(self, z: Floats, step: float) -> Floats:
-        """Numbers of ships; in each but the first a coefficient is larger by a step."""
-        deviation = self.prior.deviation
-        values = self.mean + z * deviation
-        varied = np.arange(len(IDENTIFIED))
-        lane = 1 + varied
-        row = len(Ship._fields) + varied
-
-        nominal = self.blank.ship_numbers()
-        ships = in_all_lanes(nominal)
-        ships[row] = values[:, None]
-        ships[row, lane] += step * deviation
-        return ships
-
-    def independent_errors(self, segment: Segment) -> float:
-        """Times over which errors are one error that a segment has."""
-        correlated_lengths = 1.0  # over which errors are one error
-        correlated = correlated_lengths * self.blank.travel_time
-        return segment.duration / correlated
 
     def scales(self, errors: Floats, which: Integers) -> Floats:
         """Root mean square of the errors by channel, not below the floors."""

@@ -6,18 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.models.coefficient_prior import CoefficientPrior
-from identification.models.posterior import least_scales
+from identification.models.sailed import CoefficientPrior, Sailed
 from identification.models.segments import Segment, compared_channels, cut
-from identification.models.shooting import (
-    in_all_lanes,
-    sail_lanes,
-)
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Flags, Floats, Integers
-from shipgym.engine.motion import Ship
-from shipgym.engine.records import LANES
-from shipgym.ships import Structure
 
 
 class Slopes(NamedTuple):
@@ -27,7 +19,7 @@ class Slopes(NamedTuple):
     jacobian: Floats  # shape (n_rows, n_parameters)
 
 
-class WholeTrials:
+class WholeTrials(Sailed):
     """Whole trials, each sailed from its first smoothed state by the measured rudder.
 
     A gap in time ends a part of a trial, and the next begins at its own first state.
@@ -36,14 +28,8 @@ class WholeTrials:
     def __init__(
         self, blank: ShipModel, trials: Sequence[Trial], prior: CoefficientPrior
     ) -> None:
-        self.blank = blank
-        self.prior = prior
-        self.channels = compared_channels(blank, trials)
-        self.columns = [blank.state_names.index(name) for name in self.channels]
-        self.floors = least_scales(blank, self.channels)
+        super().__init__(blank, compared_channels(blank, trials), prior)
         self.parts = _parts(blank, trials, self.channels)
-        self.numbers = blank.ship_numbers()
-        self.rows, self.matrix = _number_map(blank)
 
     @property
     def of_trials(self) -> Integers:
@@ -53,60 +39,12 @@ class WholeTrials:
     @property
     def n_errors(self) -> float:
         """Independent errors of a channel."""
-        return sum(self._independent_errors(part) for part in self.parts)
-
-    def _independent_errors(self, part: Segment) -> float:
-        """Times to sail a ship length, over which errors are one error."""
-        return part.duration / self.blank.travel_time
+        return sum(self.independent_errors(part) for part in self.parts)
 
     def errors(self, points: Floats) -> list[Floats]:
-        """Errors of the models at some points by part, by the root of their share.
-
-        A share is that of a sample in the time over which errors are one error. Shapes
-        (n_samples, n_channels, n_points). Not finite where a ship ran away.
-        """
-        ships = self._ships(points)
-        n_points = len(points)
-        by_part = []
-        for part in self.parts:
-            tiles = []
-            for begin in range(0, n_points, LANES):
-                end = begin + LANES
-                tile = ships[:, begin:end]
-                errors = self._tile_errors(part, tile)
-                tiles.append(errors)
-            of_part = np.concatenate(tiles, axis=2)
-            by_part.append(of_part)
-        return by_part
-
-    def _tile_errors(self, part: Segment, ships: Floats) -> Floats:
-        """Errors of at most as many ships as there are lanes."""
-        n_ships = ships.shape[1]
-        n_spare = LANES - n_ships
-        spare = np.repeat(
-            ships[:, -1:],
-            n_spare,
-            axis=1,
-        )
-        starts = in_all_lanes(part.start)
-        states = sail_lanes(
-            self.blank,
-            part,
-            ships=np.hstack([ships, spare]),
-            starts=starts,
-        )
-        # at the first sample the ships have not moved yet
-        simulated = states[1:, self.columns, :n_ships]
-        off = simulated - part.measured[1:, :, None]
-        share = self._independent_errors(part) / len(off)
-        return np.asarray(off * np.sqrt(share))
-
-    def _ships(self, points: Floats) -> Floats:
-        """Numbers of ships, a column for each point."""
-        coefficients = self.prior.coefficients(points)
-        ships = np.repeat(self.numbers[:, None], len(points), axis=1)
-        ships[self.rows] = self.matrix @ coefficients.T
-        return ships
+        """Errors of the models at some points by part, as of `errors_in`."""
+        ships = self.ships(points)
+        return [self.errors_in(part, ships) for part in self.parts]
 
     def scales(self, point: Floats) -> Floats:
         """Root mean square error by channel, above the floors; not finite if lost."""
@@ -186,12 +124,3 @@ def _coarser(part: Segment, longest_step: float) -> Segment:
     fine = part.inputs
     columns = [np.interp(grid, fine[:, 0], column) for column in fine.T]
     return replace(part, inputs=np.column_stack(columns), samples=samples)
-
-
-def _number_map(blank: ShipModel) -> tuple[slice, Floats]:
-    """Numbers of a ship that depend on her coefficients, and how, linearly."""
-    n_coefficients = len(blank.coefficients)
-    if isinstance(blank.dynamics, Structure):
-        return slice(-n_coefficients, None), blank.acceleration_matrix
-    first = len(Ship._fields)
-    return slice(first, first + n_coefficients), np.eye(n_coefficients)

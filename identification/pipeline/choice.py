@@ -21,6 +21,7 @@ from identification.judging.selection import (
 from identification.models.refinement import whole_trials
 from identification.models.similarity import AUTO, with_usual_hull
 from identification.pipeline.options import MAP, Options, name_of
+from identification.pipeline.result import IdentificationResult
 from identification.progress import counted
 from identification.samples.folds import pieces
 from shipgym import InputError, Particulars, Trial
@@ -43,7 +44,9 @@ RM_SVM = "rm-svm"
 class Candidate(Fitted, Protocol):
     """A structure fitted to trials, from which a result can be made."""
 
-    def result(self, options: Options, sea: Mapping[str, Any] | None = None) -> Any:
+    def result(
+        self, options: Options, sea: Mapping[str, Any] | None = None
+    ) -> IdentificationResult:
         """The model with uncertainty and predictions."""
 
 

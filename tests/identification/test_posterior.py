@@ -11,7 +11,7 @@ from identification import Uncertainty, identify
 from identification.judging.posterior import with_posterior
 from identification.judging.sampling import Chains, mixing_of, sample
 from identification.judging.warnings import model_warnings
-from identification.models.coefficient_prior import CoefficientPrior
+from identification.models.sailed import CoefficientPrior
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.trials.sensors import Sensors
