@@ -104,7 +104,7 @@ class Controller:
     may_observe: ClassVar[tuple[str, ...]] = ()
     #: Its law (`agents.controllers.law`), and the record of what that remembers of each
     #: ship.
-    law: ClassVar[Law] = staticmethod(linear_law)
+    law: ClassVar[Any] = staticmethod(linear_law)
     memory_record: ClassVar[Record] = Nothing
     #: What its law reads of `Signals` beside the heading error and its integral.
     reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "sway", "rudder")
@@ -170,7 +170,7 @@ class Controller:
             design={"dt": ship.dt, **design, **answer},
             **more,
         )
-        return replace(made, margins=made._margins(ship, model))
+        return replace(made, margins=made.margins_on(model))
 
     @property
     def name(self) -> str:
@@ -217,13 +217,6 @@ class Controller:
                 read.append(name)
         return tuple(read)
 
-    def turn_reach(self, angle: float) -> float:
-        """Distance before a turn of an angle, rad, at which it is begun, m.
-
-        It is 0 for what does not look ahead.
-        """
-        return self.gains.get("turn_reach", 0.0)
-
     @classmethod
     def is_closed_form(cls) -> bool:
         """Return True if it steers by its `law` alone, which can be translated to C."""
@@ -246,7 +239,8 @@ class Controller:
         memory : NamedTuple
             For the next interval.
         """
-        return self.law(seen, memory, self.parameters)
+        law: Law = self.law
+        return law(seen, memory, self.parameters)
 
     def predict(
         self,
@@ -371,11 +365,8 @@ class Controller:
         Raises InputError if the closed loop is unstable, or the model has no straight
         course.
         """
-        return self._margins(sample_ship(model, self.design["dt"]), model)
-
-    def _margins(self, ship: SampledShip, model: ShipModel) -> Margins:
         name = f"{type(self).__name__} on model '{model.name}'"
-        return self.loop().margins(ship, name)
+        return self.loop().margins(sample_ship(model, self.design["dt"]), name)
 
     def check_fits(
         self, names: Sequence[str], scales: Sequence[float], where: str = "observations"

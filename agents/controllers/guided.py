@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from agents.controllers.controller import ANY_NUMBER, Action, Bounds, Controller
 from agents.controllers.interface import Policy
 from agents.controllers.law import (
+    Law,
     Number,
     PathSignals,
     Turns,
@@ -161,7 +162,8 @@ class Guided(Controller):
         memory : NamedTuple
             For the next interval.
         """
-        return self.law(seen, memory, self.parameters)
+        law: Law = self.law
+        return law(seen, memory, self.parameters)
 
     def predict(
         self,

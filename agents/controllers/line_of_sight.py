@@ -20,7 +20,7 @@ from agents.controllers.guided import (
     with_path,
 )
 from agents.controllers.interface import Policy
-from agents.controllers.law import Law, Number, PathSignals
+from agents.controllers.law import Number, PathSignals
 from agents.settings import Settings, Step, setting
 from shipgym import ShipModel
 from shipgym.engine.records import Record
@@ -92,7 +92,7 @@ class IntegralLineOfSight(Guided):
 
     kind: ClassVar[str] = "ilos"
     settings_type: ClassVar[type[Settings]] = LineOfSightSettings
-    law: ClassVar[Law] = staticmethod(integral_line_of_sight)
+    law: ClassVar[Any] = staticmethod(integral_line_of_sight)
     memory_record: ClassVar[Record] = DriftMemory
     gain_names: ClassVar[tuple[str, ...]] = (*Guided.gain_names, "integral")
     bounds: ClassVar[Mapping[str, Bounds]] = {
@@ -108,7 +108,7 @@ class IntegralLineOfSight(Guided):
         *,
         autopilot: Policy | None = None,
         task: Task | None = None,
-        **settings: float | None,
+        **settings: Any,
     ) -> Self:
         """Lead an autopilot along the paths of a task.
 

@@ -18,7 +18,6 @@ import numpy as np
 
 from agents.controllers.controller import Bounds, Controller
 from agents.controllers.law import (
-    Law,
     LinearFeedback,
     Nothing,
     Number,
@@ -40,7 +39,6 @@ from agents.settings import Settings, Step, setting
 from shipgym import ShipModel
 from shipgym.arrays import Floats
 from shipgym.engine.compiling import tell_who_waits
-from shipgym.engine.records import Record
 from shipgym.models.by_name import takes_name
 from shipgym.tasks.scales import RUDDER_WEIGHT
 
@@ -159,7 +157,7 @@ class LQ(Controller):
     @classmethod
     @takes_name
     def from_model(
-        cls, model: ShipModel, *, dt: float | None = None, **settings: float | None
+        cls, model: ShipModel, *, dt: float | None = None, **settings: Any
     ) -> Self:
         """Design on a model, about straight running.
 
@@ -192,23 +190,16 @@ class LQ(Controller):
         }
         return cls.designed(model, ship, gains, own.to_dict())
 
-    @cached_property
+    def __post_init__(self) -> None:
+        if self.is_quiet:
+            object.__setattr__(self, "law", quiet_law)
+            object.__setattr__(self, "memory_record", QuietMemory)
+
+    @property
     def is_quiet(self) -> bool:
         """True with a low-pass or a dead-band."""
-        return bool(
-            np.any(self.gains["rudder_update"] != 1.0)
-            or np.any(self.gains["rudder_band"] != 0.0)
-        )
-
-    @property
-    def law(self) -> Law:
-        """Law that it steers by."""
-        return quiet_law if self.is_quiet else linear_law
-
-    @property
-    def memory_record(self) -> Record:
-        """Record of what the law remembers of each ship."""
-        return QuietMemory if self.is_quiet else Nothing
+        filters = np.any(self.gains["rudder_update"] != 1.0)
+        return bool(filters or np.any(self.gains["rudder_band"] != 0.0))
 
     @cached_property
     def parameters(self) -> Any:

@@ -14,7 +14,7 @@ import numpy as np
 
 from agents.controllers.controller import Bounds, Controller
 from agents.controllers.kalman import course_filter, with_waves
-from agents.controllers.law import Gains, Law, Number, Signals, wrapped
+from agents.controllers.law import Gains, Number, Signals, wrapped
 from agents.controllers.linear_loop import checked_interval, sample_ship
 from agents.controllers.lq import LQ, SteeringCost
 from agents.controllers.margins import check_stable
@@ -237,7 +237,7 @@ class LQG(Controller):
     kind: ClassVar[str] = "lqg"
     settings_type: ClassVar[type[Settings]] = LQGSettings
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
-    law: ClassVar[Law] = staticmethod(lqg_law)
+    law: ClassVar[Any] = staticmethod(lqg_law)
     memory_record: ClassVar[Record] = LQGMemory
     reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "rudder")
     arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {
@@ -270,7 +270,7 @@ class LQG(Controller):
     @classmethod
     @takes_name
     def from_model(
-        cls, model: ShipModel, *, dt: float | None = None, **settings: float | None
+        cls, model: ShipModel, *, dt: float | None = None, **settings: Any
     ) -> Self:
         """Design on a model, about straight running: LQ's gains and a Kalman filter.
 

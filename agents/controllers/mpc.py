@@ -135,7 +135,7 @@ class MPC(WheelOver):
         *,
         autopilot: Policy | None = None,
         task: Task | None = None,
-        **settings: float | None,
+        **settings: Any,
     ) -> Self:
         """Lead LQ along the paths of a task.
 

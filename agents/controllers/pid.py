@@ -94,7 +94,7 @@ class PID(Controller):
     @classmethod
     @takes_name
     def from_model(
-        cls, model: ShipModel, *, dt: float | None = None, **settings: float | None
+        cls, model: ShipModel, *, dt: float | None = None, **settings: Any
     ) -> Self:
         """Design on a model, about straight running.
 

@@ -31,7 +31,7 @@ from agents.controllers.guided import (
     with_path,
 )
 from agents.controllers.interface import Policy
-from agents.controllers.law import Law, Number, PathSignals, clipped, wrapped
+from agents.controllers.law import Number, PathSignals, clipped, wrapped
 from agents.controllers.lq import LQ
 from agents.controllers.seen_current import (
     CurrentMemory,
@@ -368,7 +368,7 @@ class PreviewLQ(Guided):
 
     kind: ClassVar[str] = "preview-lq"
     settings_type: ClassVar[type[Settings]] = PreviewSettings
-    law: ClassVar[Law] = staticmethod(preview_law)
+    law: ClassVar[Any] = staticmethod(preview_law)
     memory_record: ClassVar[Record] = PreviewMemory
     observes: ClassVar[tuple[str, ...]] = (*Guided.observes, *COURSE_ERROR, *TURNS)
     may_observe: ClassVar[tuple[str, ...]] = ("roll", "roll_rate")
@@ -408,7 +408,7 @@ class PreviewLQ(Guided):
         *,
         autopilot: Policy | None = None,
         task: Task | None = None,
-        **settings: float | None,
+        **settings: Any,
     ) -> Self:
         """Design on a model, for the paths of a task.
 
@@ -438,15 +438,6 @@ class PreviewLQ(Guided):
         own.check_heel(shown="roll" in cls.observed_in(asked, model))
         gains = own.gains(model, asked, led)
         return cls.leading(model, led, asked, gains, own.to_dict())
-
-    def turn_reach(self, angle: float) -> float:
-        """See `Controller.turn_reach`: where weights of a tenth and more begin."""
-        noticed = 0.1
-        share = 0.1
-        for number, ends in enumerate((0.1, 0.2, 0.3, 0.6, 1.0)):
-            if self.gains[f"weight_{number}"] >= noticed:
-                share = ends
-        return share * self.gains["reach"]
 
     @property
     def needed_signals(self) -> tuple[str, ...]:

@@ -27,7 +27,6 @@ from agents.controllers.guided import (
 )
 from agents.controllers.interface import Policy
 from agents.controllers.law import (
-    Law,
     Nothing,
     Number,
     PathSignals,
@@ -105,7 +104,7 @@ class WheelOver(Guided):
 
     kind: ClassVar[str] = "wheel-over"
     settings_type: ClassVar[type[Settings]] = WheelOverSettings
-    law: ClassVar[Law] = staticmethod(wheel_over_law)
+    law: ClassVar[Any] = staticmethod(wheel_over_law)
     observes: ClassVar[tuple[str, ...]] = (*Guided.observes, *COURSE_ERROR, *TURNS)
     reads: ClassVar[tuple[str, ...]] = (
         "cross_track",
@@ -135,7 +134,7 @@ class WheelOver(Guided):
         *,
         autopilot: Policy | None = None,
         task: Task | None = None,
-        **settings: float | None,
+        **settings: Any,
     ) -> Self:
         """Lead an autopilot along the paths of a task.
 

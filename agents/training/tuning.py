@@ -164,7 +164,11 @@ def _job(plan: TrainingPlan, study: Any, trial: Any) -> dict[str, Any]:
         if one.user_attrs["ended"] == "finished"
     ]
     limits = median_costs(curves, plan.settings.total_steps)
-    return {"request": request.to_dict(), "limits": limits}
+    return {
+        "request": request.to_dict(),
+        "allow_code": list(plan.request.allow_code),
+        "limits": limits,
+    }
 
 
 def median_costs(curves: Sequence[Curve], total_steps: int) -> list[tuple[int, float]]:
@@ -197,7 +201,8 @@ def train_trial(job: dict[str, Any]) -> dict[str, Any]:
     from agents.training.evaluation import TrainingProgress
     from agents.training.training import train
 
-    plan = make_plan(TrainingRequest.from_dict(job["request"], "trial"))
+    request = TrainingRequest.from_dict(job["request"], "trial")
+    plan = make_plan(replace(request, allow_code=job["allow_code"]))
     curve: list[tuple[int, float]] = []
 
     def stop_early(now: TrainingProgress) -> None:

@@ -150,7 +150,8 @@ def test_trials_are_trainings_that_stop_when_they_fall_behind():
         "n_epochs": 1,
     }
     request = TrainingRequest("ppo", options={"episode_steps": 20}, settings=small)
-    job = {"request": make_plan(request).request.to_dict(), "limits": []}
+    asked = make_plan(request).request.to_dict()
+    job = {"request": asked, "allow_code": [], "limits": []}
     finished = train_trial(job)
     assert [steps for steps, _ in finished["curve"]] == [64, 128, 192, 256]
     behind = train_trial({**job, "limits": [(100, 0.0)]})
