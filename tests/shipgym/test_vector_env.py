@@ -1,7 +1,6 @@
 """The native vector environments: Gymnasium's promises, and the single environments row
 by row."""
 
-import warnings
 from dataclasses import replace
 
 import gymnasium
@@ -44,7 +43,6 @@ def test_conformance_and_rows_that_are_single_environments(name, mode):
     ("name", "options"),
     [
         (COURSE, {"sea": "rough", "noise": 1.0, "measurement": "filtered"}),
-        (PATH, {"sea": ["calm", "moderate"], "noise": 2.0}),
         (
             PATH,
             {
@@ -53,7 +51,6 @@ def test_conformance_and_rows_that_are_single_environments(name, mode):
                 "speed_range": (0.7, 1.0),
             },
         ),
-        (COURSE, {"action": "rudder-discrete"}),
         (PATH, {"model": "kvlcc2", "action": "rudder-shaft"}),
         (
             COURSE,
@@ -185,22 +182,6 @@ def test_ships_differ_from_episode_to_episode_and_return_with_the_seed():
     np.testing.assert_array_equal(env.physical_state()["u"], speeds)
     env.reset()
     assert not np.array_equal(env.physical_state()["u"], speeds)
-
-
-def test_workers_of_other_processes():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        env = gymnasium.make_vec(
-            f"shipgym:{COURSE}",
-            2,
-            "async",
-            vector_kwargs={"context": "spawn"},
-            model="mariner",
-        )
-    seen, _ = env.reset(seed=4)
-    ours, _ = vector(COURSE, 2).reset(seed=4)
-    np.testing.assert_array_equal(seen, ours)
-    env.close()
 
 
 def test_an_unknown_mode_is_refused():
