@@ -45,11 +45,6 @@ GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {
     ],
     "learning": [partial(environments.learning, task) for task in TASKS],
     "physics": [
-        *(
-            partial(physics.batched_physics, ship, n, aim)
-            for ship, aim in physics.FLEET.items()
-            for n in (1024, 4096)
-        ),
         physics.zigzag_run,
     ],
     "identification": [

@@ -1,7 +1,4 @@
-"""Bare ships through time, 64 at once and without a task.
-
-With held commands, or through a measured trial.
-"""
+"""Ships through a measured trial, 64 at once and without a task."""
 
 from math import fabs
 from typing import Any
@@ -14,34 +11,9 @@ from shipgym.engine.hooks import (
     store_motion,
 )
 from shipgym.engine.lane_records import WindAccelerations
-from shipgym.engine.motion import CALM, Push, sail
+from shipgym.engine.motion import Push, sail
 from shipgym.engine.records import LANES
 from shipgym.engine.trajectories import NO_LIMIT, replaced, with_gear
-
-
-def advance_tile(state: Any, command: Any, h: float, ships: Any) -> None:
-    """Move the ships of one tile by h seconds, the commands held."""
-    for lane in range(LANES):
-        ship = load_ship(ships, lane)
-        coefficients = load_coefficients(ships, lane)
-        motion = load_motion(state, lane)
-        rudder = command[lane]
-        shaft = command[LANES + lane]
-        motion = sail(motion, rudder, shaft, h, CALM, coefficients, ship)
-        store_motion(state, lane, motion)
-
-
-def advance_batch(states: Any, commands: Any, h: float, steps: int, ships: Any) -> None:
-    """Take some Runge-Kutta steps of h seconds of all ships in calm water.
-
-    `states`, shape (n_tiles, n_state * 64), are changed in place; `commands`, (n_tiles,
-    2 * 64), are rudder angle, rad, and shaft speed, 1/s, of each lane, held over all
-    steps; `ships`, (n_ships, n_rows * 64), are one tile of ships for all, or one for
-    each tile of states.
-    """
-    for _ in range(steps):
-        for tile in range(len(states)):
-            advance_tile(states[tile], commands[tile], h, ships[tile % len(ships)])
 
 
 def sail_segment(

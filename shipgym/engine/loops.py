@@ -16,7 +16,6 @@ from shipgym.engine.trajectories import SEA_CHANNELS
 VECTOR = "float64[::1]"
 TABLE = "float64[:, ::1]"
 SEA = f"{VECTOR}, uint64[::1], {VECTOR}"  # state, random numbers, parameters
-BATCH = f"void({TABLE}, {TABLE}, float64, int64, {TABLE})"
 
 
 @dataclass(frozen=True)
@@ -58,8 +57,6 @@ LOOPS = {
         shared=False,
         hooks=MEASURED_GEAR,
     ),
-    "per_ship": Loop(batches.advance_batch, BATCH, LANES, shared=False),
-    "shared_ship": Loop(batches.advance_batch, BATCH, LANES),
 }
 
 

@@ -2,11 +2,8 @@
 be vectorised."""
 
 import numpy as np
-import pytest
 
-import shipgym
 from shipgym.engine.compiling import compiled
-from shipgym.engine.loops import ship_loop
 from shipgym.engine.mathematics import (
     arctan,
     arctan2,
@@ -14,9 +11,6 @@ from shipgym.engine.mathematics import (
     sin_cos,
     wrap,
 )
-from shipgym.engine.records import LANES
-
-SHIPS = ("mariner", "container", "tanker", "kvlcc2")
 
 
 def loop(x, y, out):
@@ -56,40 +50,6 @@ def test_the_arc_tangent_is_exact_to_rounding_over_its_whole_range():
     _, single, double = over(x, y)
     np.testing.assert_allclose(single, np.arctan(x), rtol=5e-16)
     np.testing.assert_allclose(double, np.arctan2(y, x), rtol=5e-16)
-
-
-@pytest.mark.parametrize("shared", [True, False], ids=["one ship", "a ship a lane"])
-@pytest.mark.parametrize("name", SHIPS)
-def test_a_ship_in_a_batch_sails_as_it_does_alone(name, shared):
-    """Every lane with a rudder of its own, against one simulation for three of them."""
-    model = shipgym.load_model(name)
-    n_state = len(model.state_names)
-    h, steps, tiles = (
-        0.02 * model.particulars["length"] / model.particulars["speed"],
-        60,
-        2,
-    )
-    rudders = np.radians(np.linspace(-30.0, 30.0, tiles * LANES))
-    states = np.repeat(np.tile(model.service_state, (tiles, 1)), LANES, 1)
-    commands = np.empty((tiles, 2, LANES))
-    commands[:, 0], commands[:, 1] = (
-        rudders.reshape(tiles, -1),
-        model.service_shaft_speed,
-    )
-    advance = ship_loop(model.compiled, "shared_ship" if shared else "per_ship")
-    ships = np.repeat(model.ship_numbers(), 1 if shared else LANES)
-    advance(states, commands.reshape(tiles, -1), h, steps, ships[None])
-    lanes = (
-        states.reshape(tiles, n_state, LANES).transpose(0, 2, 1).reshape(-1, n_state)
-    )
-    for lane in (0, 40, 127):
-        held = np.tile(model.service_command, (steps, 1))
-        held[:, 0] = rudders[lane]
-        alone = model.simulate(held, h)
-        for channel, value in zip(model.state_names, lanes[lane], strict=True):
-            assert value == pytest.approx(alone[channel][-1], rel=1e-10, abs=1e-12), (
-                channel
-            )
 
 
 def test_sine_and_cosine_to_the_last_digits():
