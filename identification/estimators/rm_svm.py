@@ -27,7 +27,7 @@ from identification.samples.folds import FOLDS, TRIALS, held_out_rows
 from identification.samples.prediction import predict
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Flags, Floats
-from shipgym.checks import check_choice, check_flag, check_number, check_whole
+from shipgym.checks import check_choice, check_number
 from shipgym.ships import GreyBox
 
 #: Weight of the errors at which nothing is added to the reference ship.
@@ -55,20 +55,10 @@ class RMSVM(LinearRegressor):
     epsilon : float or None, at least 0
         The insensitive band in [0, 1], standard deviations of the target. None: 0.1, or
         by `identify` from a pattern search.
-    objective : {"rmse", "correlation"}
-        What that search compares of simulated and measured heading; "correlation" as in
-        the paper, which is blind to scale and offset.
-    free_constant : bool
-        Whether `identify` leaves the constant unpenalised, as the paper does. By
-        default it is penalised like the other terms, so that the weight leads from the
-        bare reference ship to the free fit in small steps.
     folds : {"trials", "largest-rudder"}
         What `identify` chooses the weight by: each trial held out in turn (of a single
         one, pieces), or the trials of the largest rudder together, for models that are
         to turn harder than any trial.
-    constant : int or None
-        Column that is a free constant, or its integral, by which rows are divided;
-        `identify` finds it.
 
     Attributes
     ----------
@@ -82,30 +72,15 @@ class RMSVM(LinearRegressor):
     """
 
     name: ClassVar[str] = "rm-svm"
-    options: ClassVar[tuple[str, ...]] = (
-        "C",
-        "epsilon",
-        "objective",
-        "free_constant",
-        "folds",
-        "constant",
-    )
+    options: ClassVar[tuple[str, ...]] = ("C", "epsilon", "folds")
 
     C: float | None = None
     epsilon: float | None = None
-    objective: str = "rmse"
-    free_constant: bool = False
-    constant: int | None = None
     folds: str = TRIALS
 
     def check(self) -> None:
         """Refuse settings that cannot be, by an InputError that names the setting."""
-        objectives = ("rmse", "correlation")
-        check_choice(self.objective, objectives, "objective")
         check_choice(self.folds, FOLDS, "folds")
-        check_flag(self.free_constant, "free_constant")
-        if self.constant is not None:
-            check_whole(self.constant, "constant", at_least=0)
         if self.C is not None:
             check_number(self.C, "C", at_least=0.0)
         if self.epsilon is not None:
@@ -116,38 +91,36 @@ class RMSVM(LinearRegressor):
         """Fit to samples (n_samples, n_features) and targets (n_samples,)."""
         self.check()
         features, targets = validated(self, X, y)
-        rows = _Standardised(features, targets, self.constant)
+        size = column_rms(features)
+        scale = np.where(size > 0.0, size, 1.0)
+        deviation = root_mean_square(targets) or 1.0
         weight = 1.0 if self.C is None else float(self.C)
-        if weight == NO_CORRECTION:
-            self.coef_ = np.zeros(features.shape[1])
-            # its uncertainty is that of the weakest correction
-            self.inverse_moment_ = rows.inverse_moment(WEAKEST)
-        else:
-            slopes, offset = self._solve(rows, weight)
-            self.coef_ = rows.coefficients(slopes, offset)
-            self.inverse_moment_ = rows.inverse_moment(weight)
+        self.coef_ = np.zeros(features.shape[1])
+        if weight != NO_CORRECTION:
+            C = weight / len(targets)
+            slopes = _through_zero(features / scale, targets / deviation, C, self.band)
+            self.coef_ = slopes * deviation / scale
 
-        residuals = targets - features @ self.coef_
-        self.covariance_ = mean_square(residuals) * self.inverse_moment_
+        # the uncertainty of no correction is that of the weakest
+        strength = len(targets) / (weight or WEAKEST)
+        moment = features.T @ features + np.diag(strength * scale**2)
+        self.set_covariance(features, targets, moment)
         return self
 
-    def _solve(self, rows: "_Standardised", weight: float) -> tuple[Floats, float]:
-        """Slopes and offset for standardised features and targets."""
-        Z = rows.features
-        e = rows.targets
-        if not Z.shape[1]:
-            return np.zeros(0), 0.0
+    @property
+    def band(self) -> float:
+        """The insensitive band, where none is given a tenth."""
+        return FIRST_BAND if self.epsilon is None else float(self.epsilon)
 
-        band = FIRST_BAND
-        if self.epsilon is not None:
-            band = float(self.epsilon)
-        C = weight / len(e)
-        if self.constant is None:
-            return _through_zero(Z, e, C=C, band=band), 0.0
-        solver = SVR(kernel="linear", C=C, epsilon=band).fit(Z, e)
-        slopes = np.asarray(solver.coef_, dtype=float).ravel()
-        offset = float(np.sum(solver.intercept_))
-        return slopes, offset
+    def set_covariance(self, features: Floats, targets: Floats, moment: Floats) -> None:
+        """Set that of the ridge regression whose regularised moment is given."""
+        self.inverse_moment_ = np.linalg.pinv(moment, hermitian=True)
+        residuals = targets - features @ self.coef_
+        self.covariance_ = mean_square(residuals) * self.inverse_moment_
+
+    def error(self, model: ShipModel, trial: Trial) -> float:
+        """What the search for the bands makes small."""
+        return heading_error(model, trial)
 
     def fit_equations(self, task: FitTask) -> Estimators:
         """Copies fitted to all equations, weight and bands chosen where not given.
@@ -182,72 +155,6 @@ class RMSVM(LinearRegressor):
                 estimator.search_ = search.of(k, BAND)
             found[q] = estimator
         return found
-
-
-class _Standardised:
-    """Features and targets of unit size, and of zero mean where a constant is free.
-
-    Attributes
-    ----------
-    features : array of shape (n_samples, n_penalised)
-        Of the penalised terms.
-    targets : array of shape (n_samples,)
-        In standard deviations.
-    """
-
-    def __init__(self, X: Floats, y: Floats, constant: int | None) -> None:
-        n_samples, n_features = X.shape
-        self._X = X
-        self._constant = constant
-        self._penalised = np.arange(n_features) != constant
-        self._duration = np.ones(n_samples)
-        if constant is not None:
-            self._duration = X[:, constant]
-        self._standardise_features(X / self._duration[:, None])
-        self._standardise_targets(y / self._duration)
-
-    def _standardise_features(self, rows: Floats) -> None:
-        self._centre = np.zeros(rows.shape[1])
-        if self._constant is not None:
-            means = rows.mean(axis=0)
-            self._centre = np.where(self._penalised, means, 0.0)
-        deviations = rows - self._centre
-        size = column_rms(deviations)
-        has_size = (size > 0.0) & self._penalised
-        self._scale = np.where(has_size, size, 1.0)
-        standardised = deviations / self._scale
-        self.features = standardised[:, self._penalised]
-
-    def _standardise_targets(self, targets: Floats) -> None:
-        self._level = 0.0
-        if self._constant is not None:
-            self._level = float(targets.mean())
-        deviations = targets - self._level
-        self._deviation = root_mean_square(deviations) or 1.0
-        self.targets = deviations / self._deviation
-
-    def coefficients(self, slopes: Floats, offset: float) -> Floats:
-        """Coefficients of the features as given, shape (n_features,)."""
-        penalised = self._penalised
-        found = np.zeros(len(penalised))
-        scale = self._scale[penalised]
-        found[penalised] = slopes * self._deviation / scale
-        if self._constant is not None:
-            level = self._level + self._deviation * offset
-            at_centre = self._centre @ found
-            found[self._constant] = level - at_centre
-        return found
-
-    def inverse_moment(self, weight: float) -> Floats:
-        """Regularised inverse of X'X of the ridge regression of the same strength."""
-        X = self._X
-        usual_duration = np.mean(self._duration)
-        strength = len(X) / weight * usual_duration**2
-        penalty = strength * self._scale**2
-        penalty[~self._penalised] = 0.0
-        moment = X.T @ X + np.diag(penalty)
-        inverse = np.linalg.pinv(moment, hermitian=True)
-        return np.asarray(inverse)
 
 
 def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
@@ -289,8 +196,7 @@ class _Tuner:
         n_rows = len(task.samples)
         self.every = max(1, math.ceil(n_rows / most_rows))
         self.everything = np.ones(n_rows, dtype=bool)
-        band = FIRST_BAND if asked.epsilon is None else asked.epsilon
-        self.first_bands = [band] * len(task.samples.features)
+        self.first_bands = [asked.band] * len(task.samples.features)
         self._known: dict[tuple[Any, ...], RMSVM] = {}
 
     def fitted(self, equation: str, weight: float, band: float, rows: Flags) -> RMSVM:
@@ -300,7 +206,6 @@ class _Tuner:
             estimator = clone(self.asked).set_params(
                 C=weight,
                 epsilon=band,
-                constant=self._free_constant(equation),
             )
             chosen = np.flatnonzero(rows)
             used = chosen[:: self.every]
@@ -308,14 +213,6 @@ class _Tuner:
             y = self.samples.targets[equation][used]
             self._known[key] = estimator.fit(X, y)
         return self._known[key]
-
-    def _free_constant(self, equation: str) -> int | None:
-        """Column of the constant that has no penalty."""
-        terms = self.blank.table.terms(equation)
-        names = [term.name for term in terms]
-        if self.asked.free_constant and "0" in names:
-            return names.index("0")
-        return None
 
     def model(self, weight: float, bands: Sequence[float], rows: Flags) -> ShipModel:
         """The grey box with the corrections fitted to some of the rows."""
@@ -343,7 +240,7 @@ class _Tuner:
                     bands=self.first_bands,
                     rows=rows,
                 )
-                own = heading_error(model, held, "rmse")
+                own = heading_error(model, held)
                 errors.append(own)
             return float(np.mean(errors))
 
@@ -365,7 +262,7 @@ class _Tuner:
             )
             errors = []
             for trial in self.trials:
-                own = heading_error(model, trial, asked.objective)
+                own = asked.error(model, trial)
                 errors.append(own)
             return float(np.mean(errors))
 
@@ -403,20 +300,12 @@ def most_regularised(
     return choices[0]
 
 
-def heading_error(model: ShipModel, trial: Trial, objective: str) -> float:
-    """Error of the simulated heading of a trial, open loop.
+def heading_error(model: ShipModel, trial: Trial) -> float:
+    """Root mean square error of the simulated heading of a trial, open loop, rad.
 
-    Root mean square, rad ("rmse"), or 1 less Pearson's correlation with the measured
-    one ("correlation"). Infinite where the model runs away.
+    Infinite where the model runs away.
     """
     prediction = predict(model, trial)
     if prediction is None:
         return np.inf
-    predicted = prediction["psi"]
-    measured = trial["psi"]
-    if objective == "rmse":
-        return root_mean_square(predicted - measured)
-    if np.ptp(predicted) == 0.0 or np.ptp(measured) == 0.0:
-        return 1.0
-    correlations = np.corrcoef(predicted, measured)
-    return 1.0 - float(correlations[0, 1])
+    return root_mean_square(prediction["psi"] - trial["psi"])

@@ -330,7 +330,7 @@ class _Search:
                 coefficients[q] = _ridge(X, y, C)
 
             model = stage.model.with_accelerations(coefficients)
-            error = heading_error(model, held, "rmse")
+            error = heading_error(model, held)
             errors.append(error)
         return float(np.mean(errors))
 

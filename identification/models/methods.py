@@ -151,8 +151,7 @@ def without_constant(estimator: Any) -> Estimator:
     if "fit_intercept" in settings:
         copied.set_params(fit_intercept=False)
 
-    package, *_ = type(copied).__module__.split(".")
-    if package != "identification":
+    if not isinstance(copied, LinearRegressor):
         # others than our own do not know their moment
         copied = Adapted(copied)
     estimator_copy: Estimator = copied

@@ -176,12 +176,10 @@ def reference_options(options: Options) -> Options:
             " out"
         )
     if isinstance(method, RMSVM):
-        has_band = method.regression != "ls-svm" or method.epsilon is not None
-        if has_band:
-            raise InputError(
-                "method: expected RM-SVM by regression 'ls-svm' without epsilon with a"
-                " kernel, which is fitted by LS-SVM only, got epsilon-SVR"
-            )
+        raise InputError(
+            "method: expected 'rm-svm' by its name with a kernel, which is fitted by"
+            " LS-SVM only, got an RMSVM with settings; leave them out"
+        )
 
     structure = options.structure
     if structure in (Options.structure, AUTO):  # none was named

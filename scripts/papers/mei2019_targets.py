@@ -6,18 +6,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from sklearn.svm import SVR
 
 from identification import RMSVM
+from identification.estimators.linear import validated
 from identification.models.guard import with_coefficients
 from identification.models.methods import fit_all, get_method
 from identification.models.similarity import select_reference
 from identification.pipeline import identify
 from identification.pipeline.result import IdentificationResult
 from identification.samples.folds import LARGEST_RUDDER, TRIALS
+from identification.samples.prediction import predict
 from identification.samples.samples import build_samples
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
@@ -61,11 +64,45 @@ COLUMNS: Mapping[str, Any] = {
     "n": {"column": "rpm", "unit": "rpm"},
 }
 
-PAPERS_WAY: Mapping[str, Any] = {
-    "objective": "correlation",
-    "free_constant": True,
-    "C": 1.0,
-}
+
+@dataclass(eq=False, repr=False)
+class AsPrinted(RMSVM):
+    """RM-SVM as the paper has it: a constant without penalty, bands by correlation.
+
+    The last column is the constant, integrated over each row's window.
+    """
+
+    C: float | None = 1.0
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Fit to samples (n_samples, n_features) and targets (n_samples,)."""
+        features, targets = validated(self, X, y)
+        duration = features[:, -1]
+        rows, rates = features[:, :-1] / duration[:, None], targets / duration
+        centre, level = rows.mean(axis=0), rates.mean()
+        scale, deviation = np.std(rows, axis=0), np.std(rates)
+        scale[scale == 0.0] = 1.0
+        weight = float(self.C or 1.0)
+        solver = SVR(kernel="linear", C=weight / len(rows), epsilon=self.band)
+        solver.fit((rows - centre) / scale, (rates - level) / deviation)
+        slopes = solver.coef_.ravel() * deviation / scale
+        constant = level + deviation * solver.intercept_ - centre @ slopes
+        self.coef_ = np.append(slopes, constant)
+        strength = len(rows) / weight * np.mean(duration) ** 2
+        penalty = np.append(strength * scale**2, 0.0)
+        moment = features.T @ features + np.diag(penalty)
+        self.set_covariance(features, targets, moment)
+        return self
+
+    def error(self, model: ShipModel, trial: Trial) -> float:
+        """1 less Pearson's correlation of the simulated heading with the measured."""
+        predicted = predict(model, trial)
+        if predicted is None:
+            return float("inf")
+        headings = predicted["psi"], trial["psi"]
+        if not all(np.ptp(psi) for psi in headings):
+            return 1.0
+        return 1.0 - float(np.corrcoef(*headings)[0, 1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,12 +132,12 @@ class Target:
         """One of the trials."""
         return next(trial for trial in self.trials if trial.name == name)
 
-    def fit(self, reference: str, **settings: Any) -> IdentificationResult:
-        """RM-SVM with a reference ship and settings of `RMSVM`."""
+    def fit(self, reference: str, method: RMSVM) -> IdentificationResult:
+        """RM-SVM with a reference ship."""
         return identify(
             self.trials,
             structure="grey-box",
-            method=RMSVM(**settings),
+            method=method,
             particulars=self.ship.particulars,
             steering=self.ship.steering,
             service_shaft_speed=self.shaft,
@@ -226,19 +263,19 @@ def _second_by_second(trial: Trial) -> Trial:
 @cache
 def papers_way(target: Target) -> IdentificationResult:
     """The tanker as reference by pattern search on the correlation of headings."""
-    return target.fit(TANKER, **PAPERS_WAY)
+    return target.fit(TANKER, AsPrinted())
 
 
 @cache
 def our_way(target: Target, reference: str) -> IdentificationResult:
     """As reference by search on rms errors, weighted by 10/10 fits of the 20/20s."""
-    return target.fit(reference, folds=LARGEST_RUDDER)
+    return target.fit(reference, RMSVM(folds=LARGEST_RUDDER))
 
 
 @cache
 def usual_way(target: Target, reference: str) -> IdentificationResult:
     """As `our_way`, weighted by fits of three trials that predict the fourth."""
-    return target.fit(reference, folds=TRIALS)
+    return target.fit(reference, RMSVM(folds=TRIALS))
 
 
 def same_hull() -> str:

@@ -306,11 +306,6 @@ def test_what_cannot_be(
         (trials, {"method": "rls"}, r"method: .*with a kernel, got 'rls'"),
         (trials, {"method": RMSVM()}, r"method: .*LS-SVM only, got epsilon-SVR"),
         (
-            trials,
-            {"method": RMSVM(regression="ls-svm", epsilon=0.1)},
-            r"method: .*without epsilon",
-        ),
-        (
             short,
             {"method": "rm-svm", "reference_model": reference},
             "different samples for 32 centres",
