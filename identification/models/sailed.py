@@ -79,12 +79,12 @@ class Sailed:
         A share is that of a sample in the time over which errors are one error. Shape
         (n_samples, n_channels, n_ships). Not finite where a ship ran away.
         """
-        starts = in_all_lanes(part.start)
         tiles = []
         for begin in range(0, ships.shape[1], LANES):
             tile = ships[:, begin : begin + LANES]
             n_ships = tile.shape[1]
             spare = np.repeat(tile[:, -1:], LANES - n_ships, axis=1)
+            starts = in_all_lanes(part.start)  # the ships move on from them
             states = sail_lanes(self.blank, part, np.hstack([tile, spare]), starts)
             # at the first sample the ships have not moved yet
             simulated = states[1:, self._columns, :n_ships]
