@@ -1,14 +1,14 @@
 """Settings of learning: one frozen dataclass an algorithm, read from TOML.
 
-The files in `hyperparameters/` have the tuned ones, later tables before earlier ones:
-`defaults`, every setting of the algorithm to learn from scratch; those that differ
-with a base in an environment (`residual`), on every task of a suite (`suites`), on one
-of them (`tasks`).
+The files in `hyperparameters/` have the tuned values that differ from the defaults
+here, later tables before earlier ones: `defaults`, to learn from scratch; those with a
+base in an environment (`residual`), on every task of a suite (`suites`), on one of them
+(`tasks`).
 """
 
 from abc import abstractmethod
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, fields
 from math import gcd
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from shipgym.tasks.task import ACTIONS
 SEEDS_EACH = 1000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LearningSettings(Settings):
     """Settings of all algorithms; `search` has the values that tuning tries.
 
@@ -39,29 +39,36 @@ class LearningSettings(Settings):
     evaluate_every: int = setting("decisions between evaluations", at_least=1)
     net_arch: tuple[int, ...] = setting(
         "widths of the hidden layers of the policy, and of PPO's value",
+        (64, 64),
         at_least=1,
         search=[(32, 32), (64, 64), (128, 128)],
     )
     activation: str = setting(
-        "function between the layers", options=("relu", "tanh"), search=["relu", "tanh"]
+        "function between the layers",
+        "relu",
+        options=("relu", "tanh"),
+        search=["relu", "tanh"],
     )
     frame_stack: int = setting(
-        "observations that the policy sees, the newest last", at_least=1
+        "observations that the policy sees, the newest last", 1, at_least=1
     )
     action_repeat: int = setting(
         "control intervals of a decision; a base goes on with its feedback in each of"
         " them",
+        1,
         at_least=1,
         search=[1, 4, 16],
     )
     base: str = setting(
         "classical controller that the policy adds to: a kind, a controller's file that"
         ' ends in .json, "none", or "tuned", the best of those tuned for the suite\'s'
-        " task (except `designs.NO_BASES`)"
+        " task (except `designs.NO_BASES`)",
+        "none",
     )
     authority: float = setting(
         "share of the action's range by which it may differ from the base; 1 without a"
         " base",
+        1.0,
         above=0.0,
         at_most=2.0,
     )
@@ -69,6 +76,7 @@ class LearningSettings(Settings):
         "largest change of the output in force in a control interval, so that the"
         " rudder does not jump where a decision gives way to the next; 2 does not limit"
         " it",
+        2.0,
         above=0.0,
         at_most=2.0,
     )
@@ -76,6 +84,7 @@ class LearningSettings(Settings):
         "covariance: the ships that learn are drawn from the model's covariance;"
         " evaluation is on the model itself. Unlike `--randomise` it leaves seas and"
         " speeds as the task has them",
+        "none",
         options=("none", "covariance"),
     )
 
@@ -85,16 +94,19 @@ class LearningSettings(Settings):
     )
     learning_rate: float = setting(
         "learning rate of Adam at the beginning",
+        1e-3,
         above=0.0,
         at_most=1.0,
         search=(1e-4, 3e-3, "log"),
     )
     schedule: str = setting(
         "course of the learning rate; linear falls to 0 at the end of the training",
+        "linear",
         options=("constant", "linear"),
     )
     gamma: float = setting(
         "discount of a decision",
+        0.98,
         at_least=0.0,
         at_most=1.0,
         search=[0.9, 0.95, 0.98, 0.99, 0.995, 0.999],
@@ -102,6 +114,7 @@ class LearningSettings(Settings):
     reward: str = setting(
         "what ships earn: minus the steering cost, which reward_scale suits, or the"
         " bounded reward that environments give by default",
+        "cost",
         options=("cost", "bounded"),
     )
     reward_scale: float | str = setting(
@@ -132,32 +145,40 @@ class LearningSettings(Settings):
         """Decisions of all ships between two updates; a training has whole rollouts."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PPOSettings(LearningSettings):
     """Proximal policy optimisation (Schulman et al. 2017, arXiv:1707.06347)."""
 
     n_steps: int = setting(
-        "decisions of each ship in a rollout", at_least=1, search=[16, 32, 64, 128, 256]
+        "decisions of each ship in a rollout",
+        64,
+        at_least=1,
+        search=[16, 32, 64, 128, 256],
     )
     n_epochs: int = setting(
-        "uses of each sample of a rollout", at_least=1, search=(2, 12)
+        "uses of each sample of a rollout", 5, at_least=1, search=(2, 12)
     )
     gae_lambda: float = setting(
         "decay of the generalised advantage estimate",
+        0.98,
         at_least=0.0,
         at_most=1.0,
         search=(0.85, 1.0),
     )
     clip_range: float = setting(
-        "largest change of the ratio of probabilities", above=0.0, search=(0.1, 0.4)
+        "largest change of the ratio of probabilities",
+        0.2,
+        above=0.0,
+        search=(0.1, 0.4),
     )
     ent_coef: float = setting(
-        "weight of the entropy", at_least=0.0, search=(1e-6, 1e-2, "log")
+        "weight of the entropy", 0.0, at_least=0.0, search=(1e-6, 1e-2, "log")
     )
-    vf_coef: float = setting("weight of the value's error", above=0.0)
-    max_grad_norm: float = setting("longest gradient", above=0.0)
+    vf_coef: float = setting("weight of the value's error", 0.5, above=0.0)
+    max_grad_norm: float = setting("longest gradient", 0.5, above=0.0)
     log_std_init: float = setting(
         "logarithm of the action's standard deviation at the beginning",
+        -1.0,
         at_least=-10.0,
         at_most=3.0,
         search=(-3.0, 0.5),
@@ -166,6 +187,7 @@ class PPOSettings(LearningSettings):
         "value to which the logarithm of the standard deviation falls evenly over the"
         " training. A rudder that chatters costs more than steering does, and the"
         " policy that is best while it explores is not the one that is best without",
+        -3.0,
         at_least=-10.0,
         at_most=3.0,
         word="learned",
@@ -184,26 +206,30 @@ class PPOSettings(LearningSettings):
             )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class OffPolicySettings(LearningSettings):
     """Settings of the algorithms that learn from a replay buffer."""
 
-    buffer_size: int = setting("decisions that are remembered", at_least=1)
+    buffer_size: int = setting("decisions that are remembered", 200_000, at_least=1)
     learning_starts: int = setting(
-        "decisions of all ships under random actions before learning begins", at_least=0
+        "decisions of all ships under random actions before learning begins",
+        800,
+        at_least=0,
     )
-    train_freq: int = setting("decisions of each ship between updates", at_least=1)
+    train_freq: int = setting("decisions of each ship between updates", 1, at_least=1)
     gradient_steps: int = setting(
-        "gradient steps of an update", at_least=1, search=[2, 4, 8, 16]
+        "gradient steps of an update", 8, at_least=1, search=[2, 4, 8, 16]
     )
     tau: float = setting(
         "share by which the target network approaches the critic in an update",
+        0.005,
         above=0.0,
         at_most=1.0,
         search=(1e-3, 5e-2, "log"),
     )
     critic_arch: tuple[int, ...] = setting(
         "widths of the hidden layers of the critics",
+        (64, 64),
         at_least=1,
         search=[(64, 64), (128, 128), (256, 256)],
     )
@@ -221,12 +247,13 @@ class OffPolicySettings(LearningSettings):
             )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SACSettings(OffPolicySettings):
     """Soft actor-critic (Haarnoja et al. 2018, arXiv:1812.05905)."""
 
     ent_coef: float | str = setting(
         "weight of the entropy; auto or auto_0.1 adapts it, from that value",
+        "auto_0.1",
         at_least=0.0,
         search=["auto", "auto_0.1", "auto_0.01"],
         word="auto_",
@@ -234,40 +261,43 @@ class SACSettings(OffPolicySettings):
     target_entropy: float | str = setting(
         "entropy that the coefficient is adapted to; auto is -1 for each command. One"
         " command has the standard deviation 0.09 with -1, 0.24 with 0",
+        "auto",
         at_most=1.0,
         word="auto",
         search=(-3.0, 0.5),
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TD3Settings(OffPolicySettings):
     """Twin delayed DDPG (Fujimoto et al. 2018, arXiv:1802.09477)."""
 
     action_noise: float = setting(
         "standard deviation of what is added to actions to explore",
+        0.1,
         above=0.0,
         search=(0.03, 0.5, "log"),
     )
     policy_delay: int = setting(
-        "updates of the critics for one of the policy", at_least=1, search=(1, 8)
+        "updates of the critics for one of the policy", 2, at_least=1, search=(1, 8)
     )
     target_policy_noise: float = setting(
-        "standard deviation of what is added to the target's actions", at_least=0.0
+        "standard deviation of what is added to the target's actions", 0.2, at_least=0.0
     )
     target_noise_clip: float = setting(
-        "largest noise added to the target's actions", at_least=0.0
+        "largest noise added to the target's actions", 0.5, at_least=0.0
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TQCSettings(SACSettings):
     """Truncated quantile critics (Kuznetsov et al. 2020, arXiv:2005.04269)."""
 
-    n_critics: int = setting("number of critics", at_least=1)
-    n_quantiles: int = setting("quantiles of each critic", at_least=1)
+    n_critics: int = setting("number of critics", 2, at_least=1)
+    n_quantiles: int = setting("quantiles of each critic", 25, at_least=1)
     top_quantiles_to_drop: int = setting(
         "quantiles of each critic that are dropped, the largest",
+        2,
         at_least=0,
         search=(0, 5),
     )
@@ -343,14 +373,14 @@ def settings_of(algorithm: str) -> type[LearningSettings]:
 
 
 def make_settings(algorithm: str, values: Mapping[str, Any]) -> LearningSettings:
-    """Make settings of values by name, all of them.
+    """Make settings of values by name; those that have a default may be left out.
 
     Raises InputError for one unknown or missing, or a value out of its range.
     """
     kind = settings_of(algorithm)
     names = [one.name for one in fields(kind)]
-    where = f"settings of {algorithm}"
-    check_keys(values, names, where, names)
+    needed = [one.name for one in fields(kind) if one.default is MISSING]
+    check_keys(values, names, f"settings of {algorithm}", needed)
     return kind(**values)
 
 

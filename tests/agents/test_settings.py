@@ -97,8 +97,8 @@ def test_every_setting_has_a_meaning_and_a_value_with_a_base_on_the_suite(algori
         assert one.metadata["meaning"].strip(), one.name
     table = load_settings(algorithm).to_dict()
     assert make_settings(algorithm, table).to_dict() == table
-    del table["net_arch"]
-    with pytest.raises(InputError, match=f"{algorithm}: field 'net_arch' is missing"):
+    del table["total_steps"]
+    with pytest.raises(InputError, match=f"{algorithm}: field 'total_steps' is miss"):
         make_settings(algorithm, table)
     for task in load_suite().tasks:
         where = (task.environment, task.name)
