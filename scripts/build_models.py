@@ -3,7 +3,6 @@
     python scripts/build_models.py [name ...]     write to shipgym/models/library
     python scripts/build_models.py --check        compare with what is there
     python scripts/build_models.py --tables       tables of docs/identified_models.md
-    python scripts/build_models.py --candidates   what was looked at to choose
 
 What the models are compared with in these tables, turning circles at 35 degrees and
 zigzags 15/15 and 25/25, is in no model's trials. Trials, structures and methods of the
@@ -23,7 +22,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from certainty import OTHER, holds, index_intervals, true_indices
 
 import shipgym
 from identification import IdentificationResult, KernelResidual, identify
@@ -37,7 +35,6 @@ from shipgym.manoeuvres import (
 )
 from shipgym.manoeuvres.registry import standard_time
 from shipgym.models.catalogue import LIBRARY
-from shipgym.models.linear import is_course_stable
 from shipgym.trials.sensors import Sensors
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -54,7 +51,6 @@ MOST_APART = 0.1
 KEPT = {
     "kvlcc2-mmg": 1.2
 }  # the same of models from before a prior of theirs was widened
-DRAWS, NORMAL = 100, 1.96  # models drawn from each; standard errors of a 95 % interval
 #: Rudder and heading, degrees, and whether port first.
 IMO_ZIGZAGS = ((10, 10, False), (10, 10, True), (20, 20, False), (20, 20, True))
 CONTAINER_ZIGZAGS = ((10, 10, False), (20, 20, False), (20, 10, True), (35, 30, True))
@@ -66,10 +62,8 @@ SHAFT_STEPS_DEG = (
     5,
     -15,
 )  # rudder held while the shaft speed changes, half to 1.1 of that of service
-#: What the models are compared with, and what was looked at to choose between
-#: candidates.
+#: What the models are compared with.
 COMPARED_DEG: tuple[Sequence[float], ...] = ((35,), (15, 25), (10, 20))
-CHOSEN_BY_DEG: tuple[Sequence[float], ...] = ((28,), (5,), (12, 17, 22))
 
 
 @dataclass(frozen=True)
@@ -234,45 +228,6 @@ MODELS: dict[str, Recipe] = {
 ON_TANKER = {"structure": "grey-box", "method": "rm-svm", "reference_model": "tanker"}
 ON_KVLCC2 = {**ON_TANKER, "reference_model": "kvlcc2"}
 #: What did not become a model, for the page.
-REJECTED: dict[str, Recipe] = {
-    "tanker, zigzags": Recipe(
-        "tanker",
-        lambda: sea_trials("tanker", turns=False, hard=False),
-        {"structure": "cubic"},
-        shaft=True,
-    ),
-    "tanker, zigzags and turns": Recipe(
-        "tanker",
-        lambda: sea_trials("tanker", hard=False),
-        {"structure": "cubic"},
-        shaft=True,
-    ),
-    "mariner on tanker": Recipe(
-        "mariner", lambda: sea_trials("mariner", shaft_steps=False), ON_TANKER
-    ),
-    "mariner on tanker, kernel": Recipe(
-        "mariner",
-        lambda: sea_trials("mariner", shaft_steps=False),
-        {**ON_TANKER, "kernel": "rbf"},
-    ),
-    "mariner on kvlcc2": Recipe(
-        "mariner", lambda: sea_trials("mariner", shaft_steps=False), ON_KVLCC2
-    ),
-    "mariner on kvlcc2, kernel": Recipe(
-        "mariner",
-        lambda: sea_trials("mariner", shaft_steps=False),
-        {**ON_KVLCC2, "kernel": "rbf"},
-    ),
-    "kvlcc2 on tanker, linear": Recipe(
-        "kvlcc2", lambda: sea_trials("kvlcc2", shaft_steps=False), ON_TANKER, shaft=True
-    ),
-    "container, mmg4dof, regression alone": Recipe(
-        "container",
-        lambda: sea_trials("container"),
-        {"structure": "mmg4dof"},
-        shaft=True,
-    ),
-}
 
 
 def standard_errors_apart(model: ShipModel, shipped: ShipModel) -> float:
@@ -327,74 +282,18 @@ def _overshoots(model: ShipModel, angle_deg: float, port: bool) -> np.ndarray:
     return np.array([found.overshoot_1_deg, found.overshoot_2_deg], dtype=float)
 
 
-def coverage(model: ShipModel) -> tuple[str, str, str]:
-    """Counts of true values inside a model's 95 % intervals, and of draws that fail."""
-    ship = shipgym.truth_of(model)
-    deviations = np.sqrt(np.diag(model.covariance))
-    alike = model.structure == ship.structure or (model.structure, ship.structure) == (
-        "mmg",
-        "kvlcc2",
-    )
-    inside = [
-        abs(value - ship.coefficients[name]) <= NORMAL * deviation
-        for (name, value), deviation in zip(
-            model.coefficients.items(), deviations, strict=True
-        )
-        if alike and name in ship.coefficients and deviation > 0.0
-    ]
-    intervals = index_intervals(model, DRAWS)
-    intervals = {
-        key: one for key, one in intervals.items() if not key[0].startswith(OTHER)
-    }
-    held, lost = (
-        holds(intervals, true_indices(ship)),
-        np.mean([one.ran_away for one in intervals.values()]),
-    )
-    known = f"{sum(inside)} of {len(inside)}" if inside else "-"
-    return known, f"{sum(held.values())} of {len(held)}", f"{100.0 * lost:.0f}"
-
-
 def tables(names: Sequence[str]) -> None:
     """Print the rows of docs/identified_models.md: errors held out, and coverage."""
     print(
         "| name | turns, % | overshoots held out, deg | 10/10 and 20/20, deg | factor |"
-        " derivatives | indices | draws run away, % |\n| --- | --- | --- | --- | --- |"
-        " --- | --- | --- |"
+        "\n| --- | --- | --- | --- | --- |"
     )
     for name in names:
         model = shipgym.load_model(name)
         turn, *overshoots = errors(model, *COMPARED_DEG)
         factor = (model.provenance or {})["model_error"]["factor"]
         numbers = " | ".join(f"{value:.2f}" for value in (*overshoots, factor))
-        print(
-            f"| `{name}` | {turn:.1f} | {numbers} | "
-            + " | ".join(coverage(model))
-            + " |",
-            flush=True,
-        )
-
-
-def candidates() -> None:
-    """Print the criterion of choice, and the candidates that were not chosen."""
-    print(
-        "| candidate | turns at 28, at 35, % | 5/5, deg | 12/12 to 22/22, deg | holds"
-        " her course |\n| --- | --- | --- | --- | --- |"
-    )
-    models = {
-        name: shipgym.load_model(name)
-        for name in list(MODELS)[list(MODELS).index("kvlcc2-mmg") :]
-    }
-    for name, recipe in REJECTED.items():
-        models[f"{name} (rejected)"] = recipe.identify(name).model
-    for name, model in models.items():
-        turn, *overshoots = errors(model, *CHOSEN_BY_DEG)
-        hard = errors(model, COMPARED_DEG[0])[0]
-        stable = is_course_stable(model)
-        print(
-            f"| {name} | {turn:.1f}, {hard:.1f} | {overshoots[0]:.2f} |"
-            f" {overshoots[1]:.2f} | {'yes' if stable else 'no'} |",
-            flush=True,
-        )
+        print(f"| `{name}` | {turn:.1f} | {numbers} |", flush=True)
 
 
 def main() -> int:
@@ -407,13 +306,7 @@ def main() -> int:
         "--check", action="store_true", help="compare with the library, write nothing"
     )
     parser.add_argument("--tables", action="store_true", help="print the tables only")
-    parser.add_argument(
-        "--candidates", action="store_true", help="print what was chosen by"
-    )
     given = parser.parse_args()
-    if given.candidates:
-        candidates()
-        return 0
     usual = [name for name in MODELS if given.check or given.tables or name not in KEPT]
     names, differ = given.names or usual, []
     for name in names if not given.tables else ():
