@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -81,7 +82,6 @@ def build_autopilot(
     check_designs(designs, tune_seconds)
     graph_objects()  # a missing extra is reported now, not after the work
     tell = progress or (lambda *_: None)
-    failure: Exception | None = None
     files = (*FILES, *(f"{kind}.json" for kind in controller_kinds()))
     with whole_folder(Path(out), files) as draft:
         with stage(tell, "reading trials"):
@@ -89,41 +89,44 @@ def build_autopilot(
             guests = [(str(agent), load_agent(agent)) for agent in agents]
             settings = identification_settings(ship, options or {})
             trials, arguments = trials_of(ship, settings)
-        with stage(tell, "identifying"), placed(str(ship.path)):
-            fit = identify(trials, **arguments)
+        verified = partial(
+            verify,
+            draws=int(draws),
+            seed=int(seed),
+            tell=tell,
+            where=where,
+            guests=[guest for _, guest in guests],
+            designs=designs,
+            tune_seconds=tune_seconds,
+        )
 
-        def examined_fit(fit: IdentificationResult) -> AutopilotResult:
-            others = [guest for _, guest in guests]
-            work = int(draws), int(seed), tell, where, others, designs
+        def fitted(stage_name: str, **changed: Any) -> AutopilotResult:
+            with stage(tell, stage_name), placed(str(ship.path)):
+                fit = identify(trials, **(arguments | changed))
+            verify_fit = partial(verified, fit.model, trials=fit.trials)
+            return examined(ship, fit, guests, verify_fit)
 
-            def verified() -> Verification:
-                return verify(
-                    fit.model, *work, trials=fit.trials, tune_seconds=tune_seconds
-                )
-
-            return examined(ship, fit, guests, verified)
-
-        def of_structure(structure: str) -> AutopilotResult:
-            named = arguments | {"structure": structure}
-            if structure in RESPONSES:
-                named["method"] = whole_trials()
-            with stage(tell, f"identifying by {structure}"), placed(str(ship.path)):
-                simpler = identify(trials, **named)
-            return examined_fit(simpler)
-
-        result = or_simpler(examined_fit(fit), of_structure)
+        result = or_simpler(fitted)
         write_agents(result, draft)
-        try:
-            with stage(tell, "writing the report"):
-                write_findings(result, draft)
-        except OSError:
-            raise
-        except Exception as error:  # a fault of ours costs nobody the autopilots
-            error.add_note(f"the model and its autopilots are kept in {out}")
-            failure = error
+        failure = report_fault(result, draft, tell)
     if failure is not None:
+        failure.add_note(f"the model and its autopilots are kept in {out}")
         raise failure
     return result
+
+
+def report_fault(
+    result: AutopilotResult, folder: Path, tell: Progress
+) -> Exception | None:
+    """Write figures and report; a fault of ours, which costs nobody the autopilots."""
+    try:
+        with stage(tell, "writing the report"):
+            write_findings(result, folder)
+    except OSError:
+        raise
+    except Exception as error:
+        return error
+    return None
 
 
 def check_designs(designs: Sequence[str], tune_seconds: float) -> None:
@@ -187,14 +190,13 @@ def examined(
     return replace(told, remark=remark_on_damping(fit))
 
 
-def or_simpler(
-    result: AutopilotResult, of_structure: Callable[[str], AutopilotResult]
-) -> AutopilotResult:
+def or_simpler(fitted: Callable[..., AutopilotResult]) -> AutopilotResult:
     """The result, or where no autopilot is given on it, that of a simpler structure.
 
-    Of the next best of an automatic choice the first that is given one; `of_structure`
-    finds the result of a structure.
+    Of the next best of an automatic choice the first that is given one; `fitted`
+    identifies under the name of a stage with arguments that are changed.
     """
+    result = fitted("identifying")
     fit = result.identification
     ranking = fit.metrics.get("selection", {}).get("ranking", ())
     if result.refusal is None or not ranking:
@@ -202,7 +204,8 @@ def or_simpler(
     chosen = fit.model.structure
     refused = []
     for structure in simpler_structures(ranking, chosen):
-        simpler = of_structure(structure)
+        method = {"method": whole_trials()} if structure in RESPONSES else {}
+        simpler = fitted(f"identifying by {structure}", structure=structure, **method)
         if simpler.stable and simpler.refusal is None:
             reason = (
                 f"{chosen} predicts best, but no autopilot is given on it"

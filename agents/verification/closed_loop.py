@@ -7,9 +7,11 @@ gathers speed without end on a straight course, does not count, since no autopil
 steers the speed.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -23,6 +25,9 @@ from shipgym.errors import InputError, UnstableModelError
 from shipgym.models import ShipModel
 from shipgym.models.simulate import orders, simulate
 from shipgym.trials.trial import Trial
+
+if TYPE_CHECKING:
+    from agents.agent_file import Agent
 
 #: Share of the models drawn that an autopilot may lose control of.
 MOST_LOST = 0.05
@@ -43,6 +48,15 @@ class Held(NamedTuple):
         per_cent = 100.0 * self.share
         pace = "slower" if self.share < 1.0 else "faster"
         return f"{pace}, {per_cent:.0f} % of the first design's bandwidth"
+
+
+def in_words(designs: Sequence[Held]) -> dict[str, str]:
+    """How designs were retuned, by their kind; without those that were not."""
+    return {
+        str(held.controller.kind): held.in_words
+        for held in designs
+        if held.share != 1.0
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,13 +81,18 @@ class ClosedLoop:
             counted[number] = possible
         return counted
 
-    def keep_course(self, controller: Controller, episodes: Episodes) -> Held:
-        """A heading autopilot with its episodes, retuned if it loses too many."""
-        return self._held(
-            Held(controller, episodes),
-            run=lambda other: sail(other, self.draws, judged_task(), self.seeds),
-            lost=lambda outcome: outcome.terminated,
-        )
+    def sail(self, autopilot: Agent) -> Episodes:
+        """An episode of each model under a heading autopilot."""
+        return sail(autopilot, self.draws, judged_task(), self.seeds)
+
+    def keep_courses(
+        self, controllers: Sequence[Controller], episodes: Sequence[Episodes]
+    ) -> list[Held]:
+        """Heading autopilots with their episodes, retuned if they lose too many."""
+        return [
+            self._held(Held(*first), self.sail, lambda outcome: outcome.terminated)
+            for first in zip(controllers, episodes, strict=True)
+        ]
 
     def keep_track(self, guide: Controller) -> Held:
         """A path autopilot with its track on the models that count, likewise."""
@@ -82,11 +101,7 @@ class ClosedLoop:
         def run(other: Controller) -> Track:
             return keep_track(other, ships)
 
-        held = self._held(
-            Held(guide, run(guide)),
-            run=run,
-            lost=lost_tracks,
-        )
+        held = self._held(Held(guide, run(guide)), run, lost_tracks)
         return held._replace(outcome=self._of_counted(held.outcome))
 
     def loses_too_many(self, lost: Flags) -> bool:

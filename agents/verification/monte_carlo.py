@@ -42,6 +42,12 @@ class MonteCarlo:
     course_unstable: Flags
     episodes: tuple[Episodes, ...]  # of each controller, one episode on each draw
 
+    @property
+    def stable_draws(self) -> list[ShipModel]:
+        """Models drawn that run away in no manoeuvre."""
+        stable = np.flatnonzero(~self.manoeuvres.unstable)
+        return [self.draws[number] for number in stable.tolist()]
+
 
 def monte_carlo(
     controllers: Sequence[Controller],

@@ -12,12 +12,12 @@ import numpy as np
 from agents.controllers.controller import Controller
 from agents.controllers.registry import controller_class
 from agents.jobs import HERE, JobEngine
-from agents.rollouts.course_keeping import Episodes, sail, step_response
+from agents.rollouts.course_keeping import Episodes, step_response
 from agents.training.controller_space import searched_kinds
-from agents.verification.closed_loop import ClosedLoop
+from agents.verification.closed_loop import ClosedLoop, in_words
 from agents.verification.monte_carlo import monte_carlo
 from agents.verification.result import STEP_DEG, Pilot, Verification
-from agents.verification.tracks import judged_task, track_task
+from agents.verification.tracks import track_task
 from agents.verification.tuned import tuned_design
 from identification.progress import Progress
 from shipgym.checks import quoted
@@ -68,23 +68,13 @@ def verify(
         seeds=seed + np.arange(draws),
         trials=trials,
     )
-    courses = []
-    for controller, first in zip(designed.controllers, found.episodes, strict=True):
-        courses.append(loop.keep_course(controller, first))
+    courses = loop.keep_courses(designed.controllers, found.episodes)
     tracks = [loop.keep_track(guide) for guide in designed.guides]
-    steered: list[tuple[Agent, Episodes]] = []
-    for held in courses:
-        steered.append((held.controller, held.outcome))
-    for guest in guests:
-        steered.append((guest, sail(guest, loop.draws, judged_task(), loop.seeds)))
-
-    stable = np.flatnonzero(~found.manoeuvres.unstable)
-    ships = [model, *[found.draws[number] for number in stable.tolist()]]
-    pilots = run_pilots(steered, ships, tell)
-    retuned = {}
-    for held in (*courses, *tracks):
-        if held.share != 1.0:
-            retuned[str(held.controller.kind)] = held.in_words
+    steered = [
+        *[(held.controller, held.outcome) for held in courses],
+        *[(guest, loop.sail(guest)) for guest in guests],
+    ]
+    pilots = run_pilots(steered, [model, *found.stable_draws], tell)
     return Verification(
         draws=draws,
         seed=seed,
@@ -95,7 +85,7 @@ def verify(
         refused=designed.refused,
         tracks=tuple(held.outcome for held in tracks),
         counted=loop.counted,
-        retuned=retuned,
+        retuned=in_words([*courses, *tracks]),
         tuned=designed.tuned,
     )
 

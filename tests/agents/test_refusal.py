@@ -168,7 +168,8 @@ def test_a_design_that_loses_models_is_given_slower(fit):
     late = replace(model, steering=replace(model.steering, time_constant=20.0))
     loop = ClosedLoop(model, [late] * 4, np.arange(4), ())
     first = sail(firm, [late] * 4, seeds=np.arange(4))
-    held = loop.keep_course(firm, replace(first, terminated=np.ones(4, dtype=bool)))
+    lost = replace(first, terminated=np.ones(4, dtype=bool))
+    (held,) = loop.keep_courses([firm], [lost])
     assert held.share in SHARES
     own = held.controller.design["frequency"] / firm.design["frequency"]
     assert own == pytest.approx(held.share)
@@ -205,14 +206,16 @@ def test_where_no_autopilot_is_given_the_next_best_structure_is_tried(chain):
     refused = replace(result, identification=chosen, refusal="it is lost")
 
     by_structure = {"norrbin": refused, "nomoto": result}
-    given = or_simpler(refused, by_structure.__getitem__)
+    given = or_simpler(
+        lambda _, structure="", **more: by_structure.get(structure, refused)
+    )
     assert given.refusal is None
     assert given.remark.startswith(f"{own} predicts best, but no autopilot is given")
     assert "(it is lost): the model and the autopilots are nomoto's" in given.remark
 
-    of_none = or_simpler(refused, lambda _: refused)
+    of_none = or_simpler(lambda _, **changed: refused)
     assert of_none.refusal == "it is lost; nor is one given on norrbin and nomoto"
-    assert or_simpler(result, by_structure.__getitem__) is result
+    assert or_simpler(lambda _, **changed: result) is result
 
 
 def test_a_model_that_is_refused_gives_a_report_that_says_why(chain, tmp_path):
