@@ -8,12 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from shipgym.arrays import Floats
 from shipgym.checks import placed
 from shipgym.errors import InputError
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.readers.message_clock import log_clock
-from shipgym.trials.readers.message_tracks import Track, choose_tracks
+from shipgym.trials.readers.message_tracks import (
+    Track,
+    choose_tracks,
+    wind_over_ground,
+)
 from shipgym.trials.readers.messages import Heard, is_wind
 from shipgym.trials.readers.nmea0183 import hear_sentences
 from shipgym.trials.readers.nmea2000 import hear_pgns
@@ -35,36 +38,32 @@ def read_messages(path: Path, content: bytes, *, strict: bool = False) -> LogTab
         hear_pgns(lines, heard)
     hear_deltas(lines, heard)
     notes = _check_damage(path, heard, strict=strict) + heard.notes
-    if not heard.count and any("!AIVD" in line for line in lines):
-        raise InputError(
-            f"{path}: this looks like a log of AIS: positions of other ships, without"
-            " their rudders; expected the own ship's sentences (RMC, HDT, RSA), got"
-            " none; log these too"
-        )
     clock = log_clock(path, heard, notes)
-    if clock is None:
-        raise InputError(
-            f"{path}: expected sentences with a time (RMC, GGA, GLL or ZDA) or a time"
-            " before each line, got none; log these too"
-        )
     of_motion = [name for name in heard.channels if not is_wind(name)]
-    if not set(of_motion) - {"variation"}:
-        raise InputError(
-            f"{path}: expected sentences of a ship's motion (RMC, HDT, HDG, ROT, RSA"
-            " and others), got none; log these too"
+    fault = ""
+    if not heard.count and any("!AIVD" in line for line in lines):
+        fault = (
+            "this looks like a log of AIS: positions of other ships, without their"
+            " rudders; expected the own ship's sentences (RMC, HDT, RSA)"
         )
+    elif clock is None:
+        fault = (
+            "expected sentences with a time (RMC, GGA, GLL or ZDA) or a time before"
+            " each line"
+        )
+    elif not set(of_motion) - {"variation"}:
+        fault = (
+            "expected sentences of a ship's motion (RMC, HDT, HDG, ROT, RSA and others)"
+        )
+    if clock is None or fault:
+        raise InputError(f"{path}: {fault}, got none; log these too")
 
     chosen = choose_tracks(heard, clock)
-    notes += chosen.notes
     tracks = dict(chosen.by_channel)
-    winds = {}
-    for name in chosen.by_channel:
-        if is_wind(name):
-            winds[name] = tracks.pop(name)
+    winds = {name: tracks.pop(name) for name in chosen.by_channel if is_wind(name)}
     if winds and "psi" in tracks:
-        tracks |= _wind_over_ground(winds, tracks)
-    notes += _settle_speed(tracks)
-    notes += _note_speed(tracks)
+        tracks |= wind_over_ground(winds, tracks)
+    notes += chosen.notes + _settle_speed(tracks)
     return _table(path, tracks, notes, magnetic=chosen.magnetic)
 
 
@@ -80,93 +79,52 @@ def _check_damage(path: Path, heard: Heard, *, strict: bool) -> list[str]:
             f" got {damaged} of {heard.count} with a wrong or no checksum or broken"
             f" fields, this the first; {remedy}"
         )
-    if damaged:
-        return [
-            f"{damaged} of {heard.count} sentences with a wrong checksum or broken"
-            " fields left out"
-        ]
-    return []
+    if not damaged:
+        return []
+    return [
+        f"{damaged} of {heard.count} sentences with a wrong checksum or broken"
+        " fields left out"
+    ]
 
 
 def _settle_speed(tracks: dict[str, Track]) -> list[str]:
     """Leave out a course alone, and a speed over ground alone where more is known.
 
-    Such a speed is else taken as through the water.
+    Such a speed is else taken as through the water. A note says so, or that no speed is
+    known.
     """
+    notes = []
     if "sog" not in tracks or "cog" not in tracks:
         tracks.pop("cog", None)
-    if "sog" not in tracks or "cog" in tracks:
-        return []
-    alone = tracks.pop("sog")
-    if {"lat", "stw"} & tracks.keys():
-        return ["the speed over ground has no course beside it and is left out"]
-    tracks["stw"] = alone
-    return [
-        "the speed over ground is taken as through the water, as there is no course"
-        " over ground"
-    ]
-
-
-def _note_speed(tracks: dict[str, Track]) -> list[str]:
-    """A note where nothing in a log shows the speed of the ship."""
-    if {"lat", "sog", "stw"} & tracks.keys():
-        return []
-    return [
-        "no speed is known: the log has neither positions (RMC, GGA, GLL) nor a speed"
-        " (VTG, VHW, VBW); give the service speed in the ship file"
-    ]
-
-
-def _wind_over_ground(
-    winds: dict[str, Track], tracks: dict[str, Track]
-) -> dict[str, Track]:
-    """Wind over ground from that off the bow; empty where the velocity is missing."""
-    if {"wind_angle", "wind_speed"} <= winds.keys():
-        angle = winds["wind_angle"]
-        heading = _angle_at(angle.t, tracks["psi"])
-        return {
-            "wind_from": angle._replace(values=angle.values + heading),
-            "wind_speed": winds["wind_speed"],
-        }
-    has_wind = {"apparent_wind_angle", "apparent_wind_speed"} <= winds.keys()
-    has_velocity = {"sog", "cog"} <= tracks.keys()
-    if not has_wind or not has_velocity:
-        return {}
-
-    # complex: north + i east
-    angle = winds["apparent_wind_angle"]
-    heading = _angle_at(angle.t, tracks["psi"])
-    bearing = np.exp(1j * (angle.values + heading))
-    apparent = winds["apparent_wind_speed"].values * bearing
-    over_ground = tracks["sog"]
-    speed = np.interp(angle.t, over_ground.t, over_ground.values)
-    course = _angle_at(angle.t, tracks["cog"])
-    wind = apparent - speed * np.exp(1j * course)
-    return {
-        "wind_from": angle._replace(values=np.angle(wind)),
-        "wind_speed": angle._replace(values=np.abs(wind)),
-    }
-
-
-def _angle_at(t: Floats, track: Track) -> Floats:
-    """An angle at other times, rad."""
-    return np.interp(t, track.t, np.unwrap(track.values))
+    if "sog" in tracks and "cog" not in tracks:
+        alone = tracks.pop("sog")
+        if {"lat", "stw"} & tracks.keys():
+            notes = ["the speed over ground has no course beside it and is left out"]
+        else:
+            tracks["stw"] = alone
+            notes = [
+                "the speed over ground is taken as through the water, as there is no"
+                " course over ground"
+            ]
+    if not {"lat", "sog", "stw"} & tracks.keys():
+        notes.append(
+            "no speed is known: the log has neither positions (RMC, GGA, GLL) nor a"
+            " speed (VTG, VHW, VBW); give the service speed in the ship file"
+        )
+    return notes
 
 
 def _table(
     path: Path, tracks: dict[str, Track], notes: list[str], *, magnetic: bool
 ) -> LogTable:
     """One row for each time at which some channel has a value."""
-    clocks = [track.t for track in tracks.values()]
-    all_times = np.concatenate(clocks)
-    t = np.unique(all_times)
+    t = np.unique(np.concatenate([track.t for track in tracks.values()]))
     columns = {"t": t}
     first_lines = np.full(t.size, np.inf)
     for channel, track in tracks.items():
         rows = np.searchsorted(t, track.t)
-        values = np.full(t.size, np.nan)
-        values[rows] = track.values
-        columns[channel] = values
+        columns[channel] = np.full(t.size, np.nan)
+        columns[channel][rows] = track.values
         first_lines[rows] = np.minimum(first_lines[rows], track.lines)
     return LogTable(
         path=path,

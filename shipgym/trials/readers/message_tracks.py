@@ -1,14 +1,14 @@
 """Of several sources of a channel the one to read, and a log's channels over time."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.trials.readers.message_clock import Clock, is_dated, times_of
-from shipgym.trials.readers.messages import BySource, Heard, Value, port_source
+from shipgym.trials.readers.messages import BySource, Heard, port_source
 from shipgym.trials.resampling import FEWEST_SAMPLES
 from shipgym.trials.units import DEGREE
 
@@ -24,99 +24,73 @@ class Track(NamedTuple):
     lines: Floats
     values: Floats
 
+    @property
+    def covered(self) -> float:
+        """Time, s, for which a value is not older than a few seconds."""
+        longest = 3.0
+        steps = np.append(np.diff(self.t), longest)
+        return float(np.minimum(steps, longest).sum())
 
-class _Rank(NamedTuple):
-    """Rank of a source, by the most important criterion first."""
-
-    has_data: bool
-    preference: int  # by its kind
-    is_dated: bool
-    is_original: bool  # no display (II) that repeats others' sentences
-    moments: int  # at which it says something
+    def at(self, t: Floats) -> Floats:
+        """Values at other times, between those of the track on straight lines."""
+        return np.interp(t, self.t, self.values)
 
 
-@dataclass(frozen=True)
+@dataclass
 class Tracks:
     """The channels of a log, each of one source, and what was left out."""
 
-    by_channel: dict[str, Track]
-    notes: list[str]
+    by_channel: dict[str, Track] = field(default_factory=dict)
+    sources: dict[str, str] = field(default_factory=dict)  # by channel
+    notes: list[str] = field(default_factory=list)
     magnetic: bool = False  # the heading counts from magnetic north
 
 
 def choose_tracks(heard: Heard, clock: Clock) -> Tracks:
     """Channels of a log, each of its best source, on the clock of the log."""
-    notes: list[str] = []
-    tracks: dict[str, Track] = {}
-    chosen = {}
+    found = Tracks()
+    tracks = found.by_channel
     longest = 0.0
     for channel, sources in heard.channels.items():
         of_source = _tracks_of(sources, clock)
-        for track in of_source.values():
-            covered = _covered(track)
-            longest = max(longest, covered)
-        if channel == "delta":
-            tracks[channel], chosen[channel] = _rudder(of_source, sources, notes)
-            continue
-        best = _best_source(of_source, sources)
-        tracks[channel] = of_source[best]
-        chosen[channel] = best
+        longest = max(longest, *(track.covered for track in of_source.values()))
+        seconds = {port_source(source) for source in sources}
+        singles = {name: sources[name] for name in sources if name not in seconds}
+        best = _best_source(of_source, singles)
+        tracks[channel], found.sources[channel] = of_source[best], best
         if channel != "variation":
             name = channel.removesuffix("_magnetic")
-            notes += _note_others(name, best, sources)
+            found.notes += _note_others(name, best, singles)
+        if channel == "delta":
+            _choose_rudder(found, of_source, best)
 
-    if {"sog", "cog"} <= tracks.keys():
-        tracks |= _at_common_times(tracks["sog"], tracks["cog"])
-    is_magnetic = _true_heading(tracks, chosen, notes)
+    if {"sog", "cog"} <= tracks.keys():  # at rest there is no course
+        sog, cog = tracks["sog"], tracks["cog"]
+        t, of_sog, of_cog = np.intersect1d(sog.t, cog.t, return_indices=True)
+        lines = sog.lines[of_sog]
+        tracks["sog"] = Track(t, lines, sog.values[of_sog])
+        tracks["cog"] = Track(t, lines, cog.values[of_cog])
+    _choose_heading(found)
     tracks.pop("variation", None)
-    notes += _leave_out_rare(tracks, chosen, longest)
-    read = _read_from(tracks, chosen)
-    origins = f"{read}; time from {clock.source}"
-    return Tracks(
-        by_channel=tracks,
-        notes=[origins, *notes],
-        magnetic=is_magnetic,
-    )
-
-
-def _read_from(tracks: Mapping[str, Track], chosen: Mapping[str, str]) -> str:
-    """Channels by their source: ``psi from HEHDT, delta from AGRSA``."""
+    _leave_out_rare(found, longest)
     by_source: dict[str, list[str]] = {}
     for channel in tracks:
-        by_source.setdefault(chosen[channel], []).append(channel)
-    phrases = []
-    for source, channels in by_source.items():
-        names = ", ".join(channels)
-        phrases.append(f"{names} from {source}")
-    return "; ".join(phrases)
+        by_source.setdefault(found.sources[channel], []).append(channel)
+    read = [f"{', '.join(names)} from {source}" for source, names in by_source.items()]
+    found.notes.insert(0, f"{'; '.join(read)}; time from {clock.source}")
+    return found
 
 
-def _leave_out_rare(
-    tracks: dict[str, Track], chosen: Mapping[str, str], longest: float
-) -> list[str]:
-    """Leave out channels with hardly any values; notes of them."""
-    notes = []
-    for channel, track in list(tracks.items()):
+def _leave_out_rare(found: Tracks, longest: float) -> None:
+    """Leave out channels with hardly any values, with a note."""
+    for channel, track in list(found.by_channel.items()):
         count = track.t.size
         is_needed = channel in ("psi", "delta")
-        is_rare = _covered(track) < 0.1 * longest
-        is_left_out = is_rare and not is_needed
-        if is_left_out or count < FEWEST_SAMPLES:
-            del tracks[channel]
-            notes.append(
-                f"{channel} of {chosen[channel]} left out: only {count} values"
-            )
-    return notes
-
-
-def _at_common_times(sog: Track, cog: Track) -> dict[str, Track]:
-    """Speed and course over ground where both are there: at rest there is no course."""
-    t, of_sog, of_cog = np.intersect1d(sog.t, cog.t, return_indices=True)
-    lines = sog.lines[of_sog]
-    return {
-        "sog": Track(t, lines, sog.values[of_sog]),
-        "cog": Track(t, lines, cog.values[of_cog]),
-    }
+        is_rare = track.covered < 0.1 * longest
+        if (is_rare and not is_needed) or count < FEWEST_SAMPLES:
+            del found.by_channel[channel]
+            source = found.sources[channel]
+            found.notes.append(f"{channel} of {source} left out: only {count} values")
 
 
 def _tracks_of(sources: BySource, clock: Clock) -> dict[str, Track]:
@@ -133,130 +107,127 @@ def _tracks_of(sources: BySource, clock: Clock) -> dict[str, Track]:
 
 
 def _best_source(tracks: dict[str, Track], sources: BySource) -> str:
-    covered = {source: _covered(tracks[source]) for source in sources}
-    most = max(covered.values())
+    most = max(tracks[source].covered for source in sources)
 
-    def rank(source: str) -> _Rank:
-        kind = source[2:5]
-        first, *_ = sources[source]
-        return _Rank(
-            has_data=covered[source] >= 0.5 * most,
-            preference=_PREFERENCE.get(kind, 0),
-            is_dated=is_dated(first.time),
-            is_original=not source.startswith("II"),
-            moments=tracks[source].t.size,
+    def rank(source: str) -> tuple[bool, int, bool, bool, int]:
+        """The most important criterion first; II is a display that repeats others."""
+        (first, *_) = sources[source]
+        return (
+            tracks[source].covered >= 0.5 * most,
+            _PREFERENCE.get(source[2:5], 0),
+            is_dated(first.time),
+            not source.startswith("II"),
+            tracks[source].t.size,
         )
 
     return max(sorted(sources), key=rank)
 
 
-def _covered(track: Track) -> float:
-    """Time, s, for which a value is not older than a few seconds."""
-    longest = 3.0
-    steps = np.append(np.diff(track.t), longest)
-    return float(np.minimum(steps, longest).sum())
-
-
 def _note_others(channel: str, best: str, sources: BySource) -> list[str]:
-    others = []
-    for source in sorted(sources.keys() - {best}):
-        count = _count(sources[source])
-        others.append(f"{source} ({count})")
-    if not others:
+    counts = {}
+    for source in sorted(sources):
+        count = len(sources[source])
+        counts[source] = f"{source} ({count} {'values' if count != 1 else 'value'})"
+    chosen = counts.pop(best)
+    if not counts:
         return []
-    left_out = ", ".join(others)
-    count = _count(sources[best])
-    return [f"{channel} is from {best} ({count}); {left_out} left out"]
+    return [f"{channel} is from {chosen}; {', '.join(counts.values())} left out"]
 
 
-def _count(values: list[Value]) -> str:
-    count = len(values)
-    return f"{count} values" if count != 1 else "1 value"
-
-
-def _rudder(
-    tracks: dict[str, Track], sources: BySource, notes: list[str]
-) -> tuple[Track, str]:
+def _choose_rudder(found: Tracks, tracks: dict[str, Track], best: str) -> None:
     """The rudder, of two the mean, unless one of them stands still."""
-    seconds = {port_source(source) for source in tracks}
-    singles = {}
-    for source in tracks.keys() - seconds:
-        singles[source] = sources[source]
-    best = _best_source(tracks, singles)
-    notes += _note_others("delta", best, singles)
     track = tracks[best]
-    second = port_source(best)
-    port = tracks.get(second)
     speaker, *_ = best.split()
     if best == port_source(speaker):
-        notes.append(f"delta is the rudder in the port field of {speaker}")
+        found.notes.append(f"delta is the rudder in the port field of {speaker}")
+    port = tracks.get(port_source(best))
     if port is None:
-        return track, best
-
-    moves = _moves(track)
-    port_moves = _moves(port)
-    if moves and not port_moves:
-        notes.append(f"delta is the starboard rudder of {best}: the port one is still")
-        return track, best
-    if port_moves and not moves:
-        notes.append(f"delta is the port rudder of {best}: the starboard one is still")
-        return port, second
-
-    of_port = np.interp(track.t, port.t, port.values)
+        return
+    moves = np.ptp(track.values) > 0.5 * DEGREE
+    port_moves = np.ptp(port.values) > 0.5 * DEGREE
+    if moves != port_moves:
+        side, still = ("starboard", "port") if moves else ("port", "starboard")
+        found.notes.append(
+            f"delta is the {side} rudder of {best}: the {still} one is still"
+        )
+        if port_moves:
+            found.by_channel["delta"] = port
+            found.sources["delta"] = port_source(best)
+        return
+    of_port = port.at(track.t)
     apart_deg = np.mean(track.values - of_port) / DEGREE
-    notes.append(
+    found.notes.append(
         f"delta is the mean of two rudders of {best}; the starboard one shows"
         f" {apart_deg:.2g} deg more than the port one on average"
     )
     mean = 0.5 * (track.values + of_port)
-    return track._replace(values=mean), best
+    found.by_channel["delta"] = track._replace(values=mean)
 
 
-def _moves(track: Track) -> bool:
-    return bool(np.ptp(track.values) > 0.5 * DEGREE)
-
-
-def _true_heading(
-    tracks: dict[str, Track], chosen: dict[str, str], notes: list[str]
-) -> bool:
+def _choose_heading(found: Tracks) -> None:
     """Take the heading by compass where no true one is logged for most of the time.
 
-    The variation is added where the log has one; else True is returned: the heading
-    stays magnetic.
+    The variation is added where the log has one; else the heading stays magnetic.
     """
+    tracks, sources = found.by_channel, found.sources
     compass = tracks.pop("psi_magnetic", None)
     if compass is None:
-        return False
-    source = chosen["psi_magnetic"]
+        return
+    source = sources["psi_magnetic"]
     true = tracks.get("psi")
-    if true is not None and _covered(true) >= 0.5 * _covered(compass):
-        if source != chosen["psi"]:
-            notes.append(_heading_note(chosen["psi"], true, source, compass))
-        return False
-
     if true is not None:
-        notes.append(_heading_note(source, compass, chosen["psi"], true))
-    chosen["psi"] = source
+        counts = [
+            f"{name} ({track.t.size} values)"
+            for name, track in ((sources["psi"], true), (source, compass))
+        ]
+        is_true = true.covered >= 0.5 * compass.covered
+        if not is_true:
+            counts.reverse()
+        if source != sources["psi"]:
+            found.notes.append(f"psi is from {counts[0]}; {counts[1]} left out")
+        if is_true:
+            return
+    sources["psi"] = source
+    tracks["psi"] = compass
     variation = tracks.get("variation")
+    found.magnetic = variation is None
     if variation is None:
-        tracks["psi"] = compass
-        return True
-
-    added = np.interp(compass.t, variation.t, variation.values)
+        return
+    added = variation.at(compass.t)
     tracks["psi"] = compass._replace(values=compass.values + added)
     middle = float(np.median(added)) / DEGREE
-    side = "E" if middle >= 0.0 else "W"
-    notes.append(
+    found.notes.append(
         f"psi is the magnetic heading of {source} with the variation of"
-        f" {chosen['variation']} added, {abs(middle):.1f} deg {side}"
+        f" {sources['variation']} added, {abs(middle):.1f} deg"
+        f" {'E' if middle >= 0.0 else 'W'}"
     )
-    return False
 
 
-def _heading_note(best: str, track: Track, other: str, left_out: Track) -> str:
-    count = track.t.size
-    count_left_out = left_out.t.size
-    return (
-        f"psi is from {best} ({count} values); {other} ({count_left_out} values) left"
-        " out"
-    )
+def wind_over_ground(
+    winds: Mapping[str, Track], tracks: Mapping[str, Track]
+) -> dict[str, Track]:
+    """Wind over ground from that off the bow; empty where the velocity is missing."""
+    true = {"wind_angle", "wind_speed"} <= winds.keys()
+    kind = "wind" if true else "apparent_wind"
+    if not {f"{kind}_angle", f"{kind}_speed"} <= winds.keys():
+        return {}
+    if not true and not {"sog", "cog"} <= tracks.keys():
+        return {}
+
+    angle, speed = winds[f"{kind}_angle"], winds[f"{kind}_speed"]
+    bearing = angle.values + _continuous(tracks["psi"]).at(angle.t)
+    if true:
+        return {"wind_from": angle._replace(values=bearing), "wind_speed": speed}
+    # complex: north + i east
+    course = _continuous(tracks["cog"]).at(angle.t)
+    own = tracks["sog"].at(angle.t) * np.exp(1j * course)
+    wind = speed.values * np.exp(1j * bearing) - own
+    return {
+        "wind_from": angle._replace(values=np.angle(wind)),
+        "wind_speed": angle._replace(values=np.abs(wind)),
+    }
+
+
+def _continuous(track: Track) -> Track:
+    """An angle without jumps."""
+    return track._replace(values=np.unwrap(track.values))
