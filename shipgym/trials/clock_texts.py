@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, Integers
 from shipgym.errors import InputError
 
 DAY = 86400.0  # s
@@ -116,3 +116,30 @@ def clock_text(seconds: float) -> str:
     if is_of_day:
         return moment.strftime("%H:%M:%S")
     return moment.strftime("%Y-%m-%d %H:%M:%S")
+
+
+def spread_evenly(moments: Integers, t: Floats, tick: float, usual: int) -> Floats:
+    """Times of values that were logged moment by moment, evenly from each one on.
+
+    Parameters
+    ----------
+    moments : array of shape (n_values,)
+        Moment of each value, counted from 0 and never back. As a rule `usual` values
+        are at each, or more where the clock paused.
+    t : array of shape (n_moments,)
+        Time of each moment, s.
+    tick : float
+        Usual time between two moments, s.
+    usual : int
+        Usual number of values at a moment; the log may begin within the first one.
+    """
+    _, first, counts = np.unique(moments, return_index=True, return_counts=True)
+    place = np.arange(moments.size) - np.repeat(first, counts)
+    if counts.size:
+        place[: counts[0]] += max(usual - int(counts[0]), 0)
+    count = np.maximum(np.repeat(counts, counts), usual)
+    # the clock goes on later after a pause of the recorder
+    pauses = np.append(np.diff(t), tick)[moments]
+    pause = np.minimum(pauses, tick * np.ceil(count / usual))
+    times: Floats = t[moments] + pause * place / count
+    return times

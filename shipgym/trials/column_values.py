@@ -1,9 +1,13 @@
-"""Numbers of a column: steering commands, and numbers that stand for "no value"."""
+"""Values of a column: numbers, steering commands, positions, and "no value"."""
+
+import re
 
 import numpy as np
 
 from shipgym.arrays import Flags, Floats
+from shipgym.errors import InputError
 from shipgym.trials.columns import Column
+from shipgym.trials.readers.cell_texts import is_number
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.units import LARGEST_MAGNITUDES
 
@@ -94,10 +98,15 @@ def _is_nines(size: float) -> bool:
     return size >= 999.0 and set(digits) == {"9"}
 
 
-def no_positions(lat: Floats, lon: Floats) -> Flags:
-    """Flags of positions that stand for none: those of AIS, and zeros among others."""
-    latitude = np.abs(lat)
-    longitude = np.abs(lon)
+def read_positions(
+    table: LogTable, lat: Column, lon: Column
+) -> tuple[Floats, Floats, int]:
+    """Latitudes and longitudes, degrees, nan where there is none.
+
+    Positions that stand for none are counted: those of AIS, and zeros among others.
+    """
+    latitudes, longitudes = _read_angles(table, lat), _read_angles(table, lon)
+    latitude, longitude = np.abs(latitudes), np.abs(longitudes)
     is_beyond = (latitude > 90.0) | (longitude > 180.0)
     is_written = np.isin(latitude, (91.0, 99.0, 999.0, 9999.0))
     is_written |= np.isin(longitude, (181.0, 999.0, 9999.0))
@@ -105,7 +114,61 @@ def no_positions(lat: Floats, lon: Floats) -> Flags:
 
     sum_of_both = latitude + longitude
     is_zero = sum_of_both == 0.0
-    is_other = np.isfinite(sum_of_both) & ~is_zero
-    nearest = np.min(sum_of_both[is_other], initial=np.inf)
-    are_far = is_other.any() and nearest > 1.0
-    return none | is_zero if are_far else none
+    others = sum_of_both[np.isfinite(sum_of_both) & ~is_zero]
+    if others.size and others.min() > 1.0:
+        none |= is_zero
+    latitudes[none] = longitudes[none] = np.nan
+    return latitudes, longitudes, np.count_nonzero(none)
+
+
+_NUMBER = r"\d+(?:[.,]\d+)?"
+_ANGLE = re.compile(
+    r"\s*(?P<before>[NSEW])?\s*"
+    rf"(?P<sign>[-+]?)(?P<degrees>{_NUMBER})"
+    rf"(?:\s*[°º\s]\s*(?P<minutes>{_NUMBER}))?"
+    rf"(?:\s*['\u2032\u2019\s]\s*(?P<seconds>{_NUMBER}))?"
+    "\\s*['\u2032\u2019\"\u2033\u201d]{0,2}\\s*"
+    r"(?P<after>[NSEW])?\s*",
+    re.IGNORECASE,
+)
+
+
+def _read_angles(table: LogTable, column: Column) -> Floats:
+    """Degrees, minutes and seconds of a column, south and west negative.
+
+    Numbers of at least four digits before the point, in any cell, say that all are
+    ddmm.mmm as in NMEA 0183, as does the column's unit. Raises InputError for the first
+    cell that is none of these.
+    """
+    cells = table.texts(column.name)
+    matches = [_ANGLE.fullmatch(cell) for cell in cells]
+    has_minutes = column.unit != "deg" or any(
+        re.match(r"\d{4}", match["degrees"]) for match in matches if match
+    )
+    angles = np.full(len(cells), np.nan)
+    for row, (cell, match) in enumerate(zip(cells, matches, strict=True)):
+        if not cell:
+            continue
+        angle = None if match is None else _degrees(match, has_minutes)
+        if angle is None and is_number(cell):  # such as 1e-05
+            return table.numbers(column.name)
+        if angle is None:
+            raise InputError(
+                f"{table.cell(row, column.name)}: expected degrees (57.6872), degrees"
+                f" and minutes (57°41.234'N) or ddmm.mmm (5741.234N), got {cell!r}"
+            )
+        angles[row] = angle
+    return angles
+
+
+def _degrees(match: re.Match[str], has_minutes: bool) -> float | None:
+    """An angle in degrees; None for one of 60 minutes or seconds and more."""
+    parts = [match[name] or "0" for name in ("degrees", "minutes", "seconds")]
+    degrees, minutes, seconds = (float(part.replace(",", ".")) for part in parts)
+    if has_minutes and match["minutes"] is None:
+        degrees, minutes = divmod(degrees, 100.0)
+    if minutes >= 60.0 or seconds >= 60.0:
+        return None
+    size = degrees + minutes / 60.0 + seconds / 3600.0
+    side = (match["before"] or match["after"] or "N").upper()
+    return -size if (side in "SW") != (match["sign"] == "-") else size

@@ -9,10 +9,9 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
-from shipgym.trials.angle_texts import read_angles
 from shipgym.trials.column_values import (
     column_numbers,
-    no_positions,
+    read_positions,
     two_rudders_note,
     without_sentinels,
 )
@@ -26,7 +25,6 @@ from shipgym.trials.plausibility.values import (
     without_clock_jumps,
     without_spikes,
 )
-from shipgym.trials.readers.cell_texts import is_number
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.resampling import (
     FEWEST_SAMPLES,
@@ -207,26 +205,6 @@ def _continuous(
     return values
 
 
-def _read_position(locator: Locator, channel: str) -> Floats:
-    """Degrees of latitude or longitude in any of their forms."""
-    table = locator.table
-    column = locator.columns[channel]
-    cells = table.texts(column.name)
-    try:
-        return read_angles(cells, minutes=column.unit != "deg")
-    except ValueError as error:
-        wrong = str(error)
-    if is_number(wrong):  # such as 1e-05
-        return table.numbers(column.name)
-
-    row = cells.index(wrong) if wrong in cells else 0
-    place = locator.place(row, channel)
-    raise InputError(
-        f"{place}: expected degrees (57.6872), degrees and minutes"
-        f" (57°41.234'N) or ddmm.mmm (5741.234N), got {wrong!r}"
-    )
-
-
 def _local_track(
     locator: Locator, t: Floats, repair: str | None, notes: list[str]
 ) -> _Track:
@@ -234,14 +212,11 @@ def _local_track(
 
     Outliers are refused unless they are to be filled.
     """
-    lat = _read_position(locator, "lat")
-    lon = _read_position(locator, "lon")
-    is_none = no_positions(lat, lon)
-    if is_none.any():
-        lat[is_none] = lon[is_none] = np.nan
-        count = np.count_nonzero(is_none)
+    columns = locator.columns
+    lat, lon, none = read_positions(locator.table, columns["lat"], columns["lon"])
+    if none:
         notes.append(
-            f"{count} positions that are none (91 and 181 deg, 0 and 0) are taken as"
+            f"{none} positions that are none (91 and 181 deg, 0 and 0) are taken as"
             " missing"
         )
     check_ranges({"lat": lat, "lon": lon}, locator)

@@ -7,7 +7,7 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
-from shipgym.trials.clock_texts import DAY, read_clock, zone_seconds
+from shipgym.trials.clock_texts import DAY, read_clock, spread_evenly, zone_seconds
 from shipgym.trials.columns import Column
 from shipgym.trials.readers.cell_texts import is_number
 from shipgym.trials.readers.log_table import LogTable
@@ -177,13 +177,7 @@ def _spread(clock: Floats, notes: list[str]) -> Floats:
     sizes = np.diff(np.append(firsts, clock.size))
     usual = int(np.median(sizes))
     group = np.repeat(np.arange(firsts.size), sizes)
-    place = np.arange(clock.size) - firsts[group]
-    if sizes[0] < usual:  # the log begins within the first moment
-        place[group == 0] += usual - sizes[0]
-    spans = np.append(np.diff(moments), tick)
-    spans = np.minimum(spans, tick)
-    rows = np.maximum(sizes, usual)
-    spread: Floats = clock + spans[group] * place / rows[group]
+    spread = spread_evenly(group, moments, tick, usual)
     notes.append(
         f"the clock shows {repeats} of {clock.size} times again: it counts in steps of"
         f" {tick:.4g} s, over which the rows are spread, {usual} a step"

@@ -17,17 +17,18 @@ UNITS: dict[str, dict[str, float]] = shipped_toml("shipgym.trials", "units.toml"
 _CHANNELS = shipped_toml("shipgym.trials", "channels.toml")
 _SPELLINGS: dict[str, list[str]] = shipped_toml("shipgym.trials", "unit_names.toml")
 
-#: The quantity that each channel measures.
-QUANTITIES: dict[str, str] = {name: row["quantity"] for name, row in _CHANNELS.items()}
-
-#: What a file may hold and a trial does not: position, speed and course over ground,
-#: speed through the water.
-INPUTS = tuple(name for name, row in _CHANNELS.items() if "log_only" in row)
-
 #: Names of the channels of a trial, without time.
-CHANNELS: tuple[str, ...] = tuple(
-    name for name in QUANTITIES if name not in ("t", *INPUTS)
-)
+CHANNELS: tuple[str, ...] = tuple(name for name in _CHANNELS["trial"] if name != "t")
+
+_ROWS = {**_CHANNELS["trial"], **_CHANNELS["log"]}
+#: The quantity that each channel measures.
+QUANTITIES: dict[str, str] = {name: row[0] for name, row in _ROWS.items()}
+
+#: Largest magnitude of each channel that can be a ship's, or a small model's; SI units.
+LARGEST_MAGNITUDES: dict[str, float] = {
+    name: largest * UNITS[quantity][unit]
+    for name, (quantity, largest, unit) in _ROWS.items()
+}
 
 
 def si_unit(channel: str) -> str:
@@ -59,13 +60,6 @@ def _no_such_unit(unit: Any, quantity: str, where: str) -> InputError:
     return InputError(
         f"{where}: expected a unit of {quantity} ({expected}), got {unit!r}.{hint}"
     )
-
-
-#: Largest magnitude of each channel that can be a ship's, or a small model's; SI units.
-LARGEST_MAGNITUDES: dict[str, float] = {
-    name: row["largest"] * si_factor(name, row.get("unit", si_unit(name)))
-    for name, row in _CHANNELS.items()
-}
 
 
 def check_channel(name: str, where: str, *, time: bool = True) -> str:

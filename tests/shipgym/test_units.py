@@ -4,12 +4,7 @@ import pytest
 from scipy import constants
 
 from shipgym.errors import InputError
-from shipgym.trials.units import (
-    QUANTITIES,
-    UNITS,
-    si_factor,
-    si_unit,
-)
+from shipgym.trials.units import QUANTITIES, UNITS, si_factor, si_unit
 
 
 @pytest.mark.parametrize(

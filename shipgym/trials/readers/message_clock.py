@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
-from shipgym.trials.clock_texts import DAY, clock_text
+from shipgym.trials.clock_texts import DAY, clock_text, spread_evenly
 from shipgym.trials.readers.line_stamps import read_stamps
 from shipgym.trials.readers.messages import BySource, Heard, Value
 
@@ -171,34 +170,9 @@ def _spread(lines: Floats, clock: Clock) -> Floats:
     if begins_before and clock.leads:
         following = np.searchsorted(clock.lines, lines, side="left")
         moments = 1 + following
-    return _evenly(moments, usual, clock.t)
-
-
-def _evenly(moments: npt.NDArray[np.intp], usual: int, t: Floats) -> Floats:
-    """Times of values from moment to moment, evenly from each one on.
-
-    The moments count from 1, 0 being before the first one; values are `usual` at each,
-    or more where the clock paused.
-    """
-    step = float(np.median(np.diff(t)))
-    before = t[0] - step
-    after = t[-1] + step
-    begins = np.concatenate([[before], t, [after]])
-    pauses = np.append(np.diff(begins), step)
-
-    _, first, counts = np.unique(moments, return_index=True, return_counts=True)
-    begin = np.repeat(first, counts)
-    place = np.arange(moments.size) - begin
-    n_before = counts[0] if moments[0] == 0 else 0
-    if n_before:  # the last ones before the first moment
-        place[:n_before] += usual - n_before
-    own_count = np.repeat(counts, counts)
-    count = np.maximum(own_count, usual)
-    # the clock goes on later after a pause of the recorder
-    longest = step * np.ceil(count / usual)
-    pause = np.minimum(pauses[moments], longest)
-    times: Floats = begins[moments] + pause * place / count
-    return times
+    step = float(np.median(np.diff(clock.t)))
+    begins = np.concatenate([[clock.t[0] - step], clock.t])
+    return spread_evenly(moments, begins, step, usual)
 
 
 def _with_bursts(clock: Clock, order: list[tuple[int, str]]) -> Clock:
