@@ -38,7 +38,7 @@ def read_messages(path: Path, content: bytes, *, strict: bool = False) -> LogTab
         hear_pgns(lines, heard)
     hear_deltas(lines, heard)
     notes = _check_damage(path, heard, strict=strict) + heard.notes
-    clock = log_clock(path, heard, notes)
+    clock = log_clock(path, heard, notes) if heard.count else None
     of_motion = [name for name in heard.channels if not is_wind(name)]
     fault = ""
     if not heard.count and any("!AIVD" in line for line in lines):
