@@ -304,7 +304,7 @@ def test_what_cannot_be(
     ]
     for given, settings, message in (
         (trials, {"method": "rls"}, r"method: .*with a kernel, got 'rls'"),
-        (trials, {"method": RMSVM()}, r"method: .*LS-SVM only, got epsilon-SVR"),
+        (trials, {"method": RMSVM()}, r"method: .*LS-SVM only, got an RMSVM"),
         (
             short,
             {"method": "rm-svm", "reference_model": reference},

@@ -148,7 +148,6 @@ def test_a_wrong_option_is_named_with_its_place(
         ({"method": "ls", "C": 1.0}, r"C: .*'ls'"),
         ({"method": "map", "C": 1.0}, r"C: .*'map'"),
         ({"centres": 9}, r"centres: .*kernel"),
-        ({"objective": "rmse", "method": "abc-lssvr"}, r"objective: .*'rmse'"),
     ],
 )
 def test_options_that_do_not_belong_together_are_refused(
