@@ -342,22 +342,3 @@ def test_a_reference_ship_survives_its_file(name, tmp_path):
         again.derivatives(model.service_state, model.service_command + 0.1),
         model.derivatives(model.service_state, model.service_command + 0.1),
     )
-
-
-@pytest.mark.interpreted
-@pytest.mark.parametrize("name", ["container"])
-def test_each_ship_sails_in_the_environment(name):
-    import gymnasium
-
-    env = gymnasium.make("shipgym/CourseKeeping-v0", model=name)
-    observation, _ = env.reset(seed=0)
-    for _ in range(300):
-        error = np.arctan2(observation[0], observation[1])
-        action = np.array(
-            [np.clip(1.5 * error - 1.5 * observation[2], -1, 1)], dtype=np.float32
-        )
-        observation, reward, terminated, _, info = env.step(action)
-        assert observation in env.observation_space
-        assert not terminated
-    assert abs(info["heading_error"]) < np.radians(40.0)
-    assert np.isfinite(reward)

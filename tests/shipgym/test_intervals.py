@@ -15,16 +15,6 @@ def identified():
     return load_model("mariner-tls-svm")
 
 
-def test_intervals_hold_the_value_and_replay(identified):
-    found = manoeuvres.index_intervals(identified, n_draws=40, seed=3)
-    for index in found.values():
-        low, high = index.interval
-        assert low < index.value < high
-        assert index.n_ran_away == index.n_never_reached == 0
-    again = manoeuvres.index_intervals(identified, n_draws=40, seed=3)
-    np.testing.assert_array_equal(found["period_s"].values, again["period_s"].values)
-
-
 def test_the_interval_is_that_of_the_linearised_index(identified):
     """For small uncertainty an index is linear in the coefficients.
 
@@ -52,15 +42,6 @@ def test_the_interval_is_that_of_the_linearised_index(identified):
     )
     expected = np.sqrt(slope @ covariance @ slope)
     assert np.std(found["advance_lengths"].values) == pytest.approx(expected, rel=0.15)
-
-
-def test_a_manoeuvre_of_one_s_own(identified):
-    found = manoeuvres.index_intervals(
-        identified,
-        lambda ship: manoeuvres.zigzag_indices(manoeuvres.zigzag(ship, 15, 5)),
-        n_draws=5,
-    )
-    assert found["overshoot_1_deg"].interval is not None
 
 
 def test_draws_that_run_away_or_never_reach_are_counted():

@@ -5,9 +5,6 @@ import pytest
 
 import shipgym
 from shipgym import InputError, ManoeuvreError, Trial, load_model, manoeuvres
-from shipgym.manoeuvres.execution import (
-    reversals,
-)
 
 
 @pytest.fixture(scope="module")
@@ -52,31 +49,6 @@ def test_indices_of_a_zigzag_drawn_by_hand(triangle):
     assert indices.period_s is None
 
 
-def test_a_zigzag_cut_short_has_no_second_overshoot(triangle):
-    short = triangle.t <= 40.0
-    cut = Trial(
-        triangle.t[short],
-        {name: values[short] for name, values in triangle.channels.items()},
-        length=20,
-    )
-    indices = manoeuvres.zigzag_indices(cut)
-    assert indices.overshoot_1_deg == pytest.approx(6.0)
-    assert indices.overshoot_2_deg is None
-
-
-@pytest.mark.parametrize("name", ["mariner", "tanker"])
-def test_a_measured_rudder_reverses_when_it_was_ordered_to(name):
-    """It is traced back to the angle at which it was held, not to where it passed nine
-    tenths of it.
-    """
-    ordered = manoeuvres.zigzag(load_model(name), 10, 10, dt=0.1)
-    measured = Trial(ordered.t, {"psi": ordered["psi"], "delta": ordered["delta"]})
-    assert (
-        np.max(np.abs(np.subtract(reversals(measured)[1], reversals(ordered)[1])))
-        <= 0.1 + 1e-9
-    )
-
-
 def test_a_perfect_circle():
     """R = 300 m at 6 m/s from the start.
 
@@ -102,32 +74,6 @@ def test_a_perfect_circle():
         assert indices.steady_speed_ratio == pytest.approx(1.0)
 
 
-def test_imo_limits_are_those_of_the_resolution(mariner):
-    """MSC.137(76), annex, 5.3; L/V of the Mariner is 20.9 s."""
-    criteria = manoeuvres.imo_assessment(mariner)
-    second = 160.93 / 7.7175
-    assert {
-        name: (c.limit, c.source.rpartition(" ")[2]) for name, c in criteria.items()
-    } == {
-        "advance": (4.5, "5.3.1"),
-        "tactical_diameter": (5.0, "5.3.1"),
-        "initial_turning": (2.5, "5.3.2"),
-        "overshoot_1_10_10": (pytest.approx(5.0 + 0.5 * second), "5.3.3.1"),
-        "overshoot_2_10_10": (pytest.approx(17.5 + 0.75 * second), "5.3.3.2"),
-        "overshoot_1_20_20": (25.0, "5.3.3.3"),
-        "stopping": (15.0, "5.3.4"),
-    }
-    assert criteria["stopping"].passed is None
-    assert "cannot be ordered astern" in criteria["stopping"].note
-    stop = manoeuvres.imo_assessment(load_model("tanker"))["stopping"]
-    assert stop.value == pytest.approx(8.95, abs=0.01)
-    assert stop.passed
-    assert (
-        "ahead only"
-        in manoeuvres.imo_assessment(load_model("container"))["stopping"].note
-    )
-
-
 def test_imo_assessment_of_mariner(mariner):
     """The toolbox's Mariner turns too wide at 35 deg (6.65 L to port) and is steady
     otherwise.
@@ -138,7 +84,17 @@ def test_imo_assessment_of_mariner(mariner):
     ] == ["tactical_diameter"]
     assert criteria["tactical_diameter"].value == pytest.approx(6.65, abs=0.01)
     assert criteria["advance"].value == pytest.approx(3.71, abs=0.01)
-    assert all("MSC.137(76)" in criterion.source for criterion in criteria.values())
+    second = 160.93 / 7.7175  # per length: between 10 and 30 s
+    assert {name: criterion.limit for name, criterion in criteria.items()} == {
+        "advance": 4.5,
+        "tactical_diameter": 5.0,
+        "initial_turning": 2.5,
+        "overshoot_1_10_10": pytest.approx(5.0 + 0.5 * second),
+        "overshoot_2_10_10": pytest.approx(17.5 + 0.75 * second),
+        "overshoot_1_20_20": 25.0,
+        "stopping": 15.0,
+    }
+    assert "cannot be ordered astern" in criteria["stopping"].note
 
 
 def test_a_zigzag_that_never_reaches_its_heading_says_so_with_its_trial(mariner):

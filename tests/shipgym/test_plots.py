@@ -1,5 +1,3 @@
-import json
-
 import numpy as np
 import pytest
 
@@ -54,11 +52,6 @@ def test_every_channel_is_drawn_in_its_unit():
     assert factors == pytest.approx([1.0, np.degrees(1.0)], rel=1e-6)
 
 
-def test_a_channel_that_no_trial_has_is_left_out(circle):
-    figure = history_figure({"predicted": circle}, ["psi", "n"])
-    assert len(figure.data) == 1
-
-
 def test_without_any_of_the_channels_there_is_no_figure(circle):
     with pytest.raises(InputError, match="any of the channels n, phi, got none"):
         history_figure({"predicted": circle}, ["n", "phi"])
@@ -82,11 +75,6 @@ def test_a_zigzag_is_drawn_as_the_change_of_heading_with_its_rudder():
     figure = zigzag_figure(run)
     assert values(figure, "y", 0)[0] == 0.0
     assert values(figure, "y", 1).max() == pytest.approx(20.0, abs=0.1)
-
-
-def test_figures_hold_single_precision(circle):
-    field = json.loads(path_figure({"turn": circle}).to_json())["data"][0]["x"]
-    assert field["dtype"] == "f4"
 
 
 def test_without_plotly_the_message_says_what_to_install(monkeypatch, circle):
@@ -141,13 +129,3 @@ def test_every_manoeuvre_has_its_figure():
     for name, title in axes.items():
         figure = manoeuvre_figure(known[name].sail(ship))
         assert figure.layout.yaxis.title.text == title
-
-
-def test_speed_and_drift_follow_from_surge_and_sway(circle):
-    figure = history_figure({"turn": circle}, ["speed", "drift"])
-    assert values(figure, "y", 0) == pytest.approx(
-        np.hypot(circle["u"], circle["v"]), rel=1e-6
-    )
-    assert (
-        values(figure, "y", 1)[-1] > 0.0
-    )  # in a turn to starboard the ship moves to port of her heading

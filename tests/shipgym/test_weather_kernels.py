@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import gymnasium
 import numpy as np
 import pytest
 
@@ -198,24 +197,6 @@ def test_manoeuvres_in_weather(mariner, run):
 
 def engine(model, lanes, sea="rough", **task):
     return Engine(model, lanes, course_keeping_task(sea=sea, **task))
-
-
-def test_each_lane_of_a_rough_sea_is_the_single_environment(mariner):
-    small, large = engine(mariner, 3), engine(mariner, 70)
-    env = gymnasium.make(
-        "shipgym/CourseKeeping-v0", model="mariner", sea="rough"
-    ).unwrapped
-    seen, many = small.reset([65, 66, 67]), large.reset(np.arange(70))
-    single, _ = env.reset(seed=66)
-    for k in range(150):
-        np.testing.assert_array_equal(seen, many[65:68])
-        np.testing.assert_array_equal(single, many[66])
-        action = np.float32(0.3 * np.sin(0.1 * k))
-        seen, *_ = small.step(np.full((3, 1), action))
-        many, rewards, *_ = large.step(np.full((70, 1), action))
-        single, reward, *_ = env.step(np.array([action]))
-        assert reward == rewards[66]
-    assert len(np.unique(large.physical_state()["wind_from"])) == 70
 
 
 def test_the_environment_shows_the_measured_and_rewards_the_slow_heading(mariner):

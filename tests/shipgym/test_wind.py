@@ -15,7 +15,6 @@ from shipgym.sea import (
 from shipgym.sea.estimates import weather_particulars
 from shipgym.sea.wind import gust_filter
 from shipgym.sea.wind_coefficients import (
-    blendermann_type,
     coefficient_names,
 )
 from tests.shipgym.harmonics import evaluate_cosines, evaluate_sines
@@ -80,21 +79,6 @@ def test_similar_ships_have_the_same_coefficients():
     )
     np.testing.assert_allclose(large.Y, small.Y * 50.0**2, atol=1e-6)
     np.testing.assert_allclose(large.N, small.N * 50.0**3, atol=1e-4)
-
-
-def test_fullness_picks_the_type_of_ship():
-    np.testing.assert_array_equal(
-        wind_curves(KVLCC2).X, wind_curves(KVLCC2, "blendermann-tanker-loaded").X
-    )
-    np.testing.assert_array_equal(
-        wind_curves(S175).X, wind_curves(S175, "blendermann-container-loaded").X
-    )
-    types = [
-        blendermann_type("blendermann", fullness)
-        for fullness in (0.64, 0.65, 0.66, 0.74, 0.75, 0.76)
-    ]
-    assert types == ["container-loaded", *["cargo-loaded"] * 3, *["tanker-loaded"] * 2]
-    assert blendermann_type("blendermann-ferry", 0.9) == "ferry"
 
 
 def test_what_is_not_known_above_the_water_is_estimated_as_documented():
