@@ -6,10 +6,8 @@ the model's inertia times what the free ship would accelerate beyond what is pre
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from identification.models.forces import rigid_body_forces
 from shipgym.arrays import integral
@@ -22,8 +20,8 @@ Floats = NDArray[np.float64]
 
 def oscillate(
     model: ShipModel,
-    mean: Sequence[float],
-    amplitude: Sequence[float],
+    mean: ArrayLike,
+    amplitude: ArrayLike,
     period_s: float,
     cycles: int = 3,
     samples: int = 200,

@@ -30,6 +30,7 @@ from papers.zhu2018.fits import (
 from papers.zhu2018.steering_forms import MOST_C
 from shipgym.manoeuvres import zigzag
 from shipgym.models import ShipModel
+from shipgym.ships import get_structure
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.sensors import Sensor, Sensors
@@ -113,8 +114,9 @@ def record(seed: int) -> Trial:
 
 def as_printed(trial: Trial) -> dict[str, Difference]:
     """Sway and yaw by ABC-LSSVR on Euler samples."""
+    terms = get_structure(STRUCTURE)
     return {
-        q: steering_fit(trial, q, search("ABC", q, MOST_C[q]), STRUCTURE, change=True)
+        q: steering_fit(trial, q, search("ABC", q, MOST_C[q]), terms, change=True)
         for q in MOST_C
     }
 
