@@ -110,29 +110,32 @@ def _check_record(record: Any, name: str, where: str) -> None:
             f"{where}: {name}: expected one number at least, got no annotated fields"
         )
 
-    if name == "Settings":
-        for field in kinds:
-            if field not in record._field_defaults:
-                raise InputError(
-                    f"{field_place(record, field, where)}: Settings.{field}: expected"
-                    " a default, got none"
-                )
+    numbers = (float, int, bool)
     for field, kind in kinds.items():
         place = f"{field_place(record, field, where)}: {name}.{field}"
         default = record._field_defaults.get(field)
-        is_last = field == list(kinds)[-1]
-        may_be_list = name == "Settings" and is_last and get_origin(kind) is not tuple
-        if not (is_list(kind) and may_be_list):
+        may_be_list = name == "Settings" and field == list(kinds)[-1]
+        if not (is_list(kind) and may_be_list) or get_origin(kind) is tuple:
             _check_kind(kind, f"{name}.{field}", place)
-        is_number = kind in (float, int, bool) and isinstance(default, Real | None)
-        if isinstance(default, str) or (kind in (float, int, bool) and not is_number):
+        is_wrong = kind in numbers and not isinstance(default, Real | None)
+        if is_wrong or isinstance(default, str):
             raise unexpected(place, "a number, or a list as the last field", default)
-
     if name == "Settings":
-        for field, kind, setting, default in keywords(record):
-            if not is_list(kind):
-                place = f"{field_place(record, field, where)}: Settings.{field}"
-                _setting_of(kind, default, f"{place}: default", setting)
+        _check_defaults(record, where)
+
+
+def _check_defaults(record: Any, where: str) -> None:
+    """Refuse settings without a default, or with one beyond their bounds."""
+    for field in record._fields:
+        if field not in record._field_defaults:
+            raise InputError(
+                f"{field_place(record, field, where)}: Settings.{field}: expected"
+                " a default, got none"
+            )
+    for field, kind, setting, default in keywords(record):
+        if not is_list(kind):
+            place = f"{field_place(record, field, where)}: Settings.{field}"
+            _setting_of(kind, default, f"{place}: default", setting)
 
 
 def _check_kind(kind: Any, name: str, place: str) -> None:

@@ -202,12 +202,15 @@ class _Recorded:
 def _columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, Floats]:
     """Finite numbers over time by name; true is 1, and success is left out."""
     columns = {}
-    for name in rows[-1].keys() - {"success"}:
+    for name in rows[-1]:
         values = [row.get(name) for row in rows]
-        is_number = all(isinstance(one, int | float | np.number) for one in values)
-        if is_number and np.isfinite(np.array(values, dtype=float)).all():
-            columns[name] = np.array(values, dtype=float)
-    return {name: columns[name] for name in rows[-1] if name in columns}
+        kinds = int | float | np.number
+        if name == "success" or not all(isinstance(one, kinds) for one in values):
+            continue
+        numbers = np.array(values, dtype=float)
+        if np.isfinite(numbers).all():
+            columns[name] = numbers
+    return columns
 
 
 def _check_environment(env: Any) -> None:
