@@ -3,7 +3,6 @@ than the design, and refuses loops with little margin."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,13 +15,10 @@ from agents.training.controller_search import (
     SearchBudget,
     has_margin,
     search,
-    simplified,
     tune_controller,
-    unseen_episodes,
 )
 from agents.training.controller_space import Setting, factor, search_space
 from shipgym.errors import InputError
-from shipgym.files import write_json
 
 CALM = BenchmarkTask("calm", "course-keeping", "mariner", "", {"episode_steps": 60})
 NOISY = BenchmarkTask(
@@ -60,21 +56,6 @@ def test_a_search_is_reproducible_and_not_worse_than_the_design() -> None:
     assert has_margin(design("pid", NOISY, first.settings))
 
 
-def test_what_a_model_says_nothing_of_is_put_back_to_the_design() -> None:
-    """Nomoto's equation has no sway, but the way back to the path is seen."""
-    task = replace(PATH, model="kvlcc2-nomoto")
-    start = {
-        setting.name: setting.start for setting in search_space("preview-lq", task)
-    }
-    found = {**start, "sway_gain": 1.5}
-    far_sighted = {**start, "lookahead_lengths": 100.0}
-    episodes = unseen_episodes("preview-lq", task, 4)
-    cost = float(episodes.costs([found])[0])
-    plain, plain_cost = simplified(found, cost, far_sighted, episodes)
-    assert plain == start
-    assert plain_cost == pytest.approx(cost, rel=1e-3)
-
-
 def test_a_loop_with_little_margin_is_refused() -> None:
     plain = PID.from_model(CALM.ship)
     assert has_margin(plain)
@@ -99,28 +80,6 @@ def test_guidance_leads_the_lq_that_was_tuned_and_needs_a_path() -> None:
     for ask in (search_space, design):
         with pytest.raises(InputError, match="expected a path for 'ilos'"):
             ask("ilos", CALM)
-
-
-def test_settings_found_are_read_from_the_file_of_the_suite(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "tuned.json"
-    monkeypatch.setattr("agents.suites.suite.suite_file", lambda suite, what: path)
-    found = {
-        "pid": {"settings": {"damping": 1.0}, "cost": 2.0},
-        "lq": {"settings": {}, "cost": 3.0},
-    }
-    write_json({"tasks": {"calm": found}}, path)
-    assert tuned("best", CALM, "any").kind == "pid"
-    assert tuned("pid", CALM, "any").design["damping"] == 1.0
-    with pytest.raises(
-        InputError, match="for task 'calm' of suite 'any', 'pid', 'lq', got 'lqg'"
-    ):
-        tuned("lqg", CALM, "any")
-    with pytest.raises(
-        InputError, match=r"task of suite 'any' with tuned controllers, got 'noisy'"
-    ):
-        tuned("best", NOISY, "any")
 
 
 def test_the_suite_s_settings_make_sane_controllers_for_every_task() -> None:

@@ -15,7 +15,7 @@ from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.models import load_model
 from shipgym.sea import Current, Weather
-from shipgym.tasks.task import course_keeping_task, path_following_task
+from shipgym.tasks.task import path_following_task
 
 MARINER = load_model("mariner")
 LENGTH, SPEED = MARINER.particulars["length"], MARINER.particulars["speed"]
@@ -100,21 +100,3 @@ def test_a_learned_autopilot_is_led_but_has_no_file(tmp_path):
         match="autopilot: expected a controller of shipgym for a file, got Learned",
     ):
         guided.save(tmp_path / "guided.json")
-
-
-def test_course_keeping_and_another_corridor_are_refused():
-    guided = IntegralLineOfSight.from_model(MARINER)
-    with pytest.raises(InputError, match="in one and not in the other: cross_track"):
-        check_controller(guided, MARINER)
-    with pytest.raises(
-        InputError, match=r"'cross_track': expected 160\.93, got 80\.465"
-    ):
-        check_controller(guided, MARINER, path_following_task(corridor=0.5))
-    with pytest.raises(InputError, match=r"observation: expected shape \(9,\)"):
-        guided.predict(np.zeros(8))
-    with pytest.raises(
-        InputError, match="task: expected one with a path, got 'CourseKeeping'"
-    ):
-        IntegralLineOfSight.from_model(
-            MARINER, task=course_keeping_task(), lookahead_lengths=2.0
-        )

@@ -1,21 +1,17 @@
 """LQG autopilot: LQ with a Kalman filter, and noise moves the rudder less."""
 
-from dataclasses import replace
-
 import control
 import numpy as np
 import pytest
 
-from agents import LQ, LQG, load_agent, sail, step_response
+from agents import LQ, LQG, load_agent, sail
 from agents.controllers.kalman import kalman_gain, rudder_response, wave_model
 from agents.controllers.linear_loop import sample_ship
 from shipgym.errors import InputError
-from shipgym.models.linear import nomoto, straight_running
-from shipgym.ships.steering import SteeringGear
+from shipgym.models.linear import straight_running
 from shipgym.tasks.scales import control_interval
 from shipgym.tasks.task import course_keeping_task
 from tests.agents.mariners import MARINER, changed
-from tests.ships.nomoto import nomoto2_ship
 
 UNSTABLE = changed(N_v=1.7, N_uv=1.7)
 
@@ -115,22 +111,6 @@ def test_without_noise_it_costs_as_much_as_lq():
         for kind in (LQ, LQG)
     )
     assert lqg.cost.mean() == pytest.approx(lq.cost.mean(), rel=0.02)
-
-
-@pytest.mark.parametrize(
-    "model",
-    [
-        replace(UNSTABLE, steering=SteeringGear(35.0, 2.5)),
-        nomoto2_ship(nomoto(MARINER), MARINER.particulars, MARINER.steering),
-    ],
-    ids=["unstable", "memory of yaw"],
-)
-def test_a_new_course_is_taken_at_once_and_kept(model):
-    heading = np.degrees(
-        step_response(LQG.from_model(model), model, 20.0, duration=1200.0).heading[0]
-    )
-    assert heading[-200:] == pytest.approx(20.0, abs=0.2)
-    assert heading.max() < 23.0
 
 
 def test_the_file_holds_the_filter(tmp_path):

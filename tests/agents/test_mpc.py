@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from agents import LQ, MPC, PID, WheelOver, check_controller, load_agent
+from agents import MPC, WheelOver, check_controller, load_agent
 from agents.controllers.law import Turns
 from agents.controllers.path_ahead import FAR, PathAhead
 from agents.rollouts.rollout import episode_costs
@@ -106,9 +106,3 @@ def test_it_is_a_controller_and_a_file_with_its_design_model(tmp_path):
     (tmp_path / "guide.json").write_text(json.dumps(content))
     with pytest.raises(InputError, match=r"guide\.json: ship: "):
         load_agent(tmp_path / "guide.json")
-
-
-def test_it_simulates_lq_and_no_other_autopilot():
-    with pytest.raises(InputError, match="autopilot: expected LQ, got PID"):
-        MPC.from_model(MARINER, autopilot=PID.from_model(MARINER))
-    assert isinstance(MPC.from_model(MARINER).autopilot, LQ)

@@ -10,7 +10,7 @@ from stable_baselines3 import DQN, PPO, SAC, TD3
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecFrameStack, VecNormalize
 
-from agents import LQ, LearnedPolicy, load_agent
+from agents import LearnedPolicy, load_agent
 from agents.policies.policy import order_numbers
 from agents.training.residual import ResidualVecEnv
 from shipgym import ShipVecEnv
@@ -178,13 +178,3 @@ def test_what_a_policy_cannot_be_is_refused(name):
     make, message = REFUSED[name]
     with pytest.raises(InputError, match=message):
         LearnedPolicy.from_sb3(make())
-
-
-def test_settings_of_the_wrapper_are_those_of_the_policy():
-    base = LQ.from_model(MARINER)
-    settings = {"frame_stack": 2, "action_repeat": 3, "rate_limit": 1.0}
-    for authority, own in ((0.5, base), (1.0, None)):
-        env = ResidualVecEnv(ships(), own, authority=authority, **settings)
-        policy = LearnedPolicy.from_sb3(PPO("MlpPolicy", env, **QUICK))
-        assert (policy.base, policy.authority) == (own, authority)
-        assert settings.items() <= vars(policy).items()

@@ -15,7 +15,7 @@ from shipgym import load_model
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.sea import Current, Weather
-from shipgym.tasks.task import course_keeping_task, path_following_task
+from shipgym.tasks.task import path_following_task
 from tests.agents.mariners import MARINER
 
 PATH = path_following_task(max_turn_deg=90.0, leg_lengths=[12.0, 16.0])
@@ -129,17 +129,6 @@ def test_heel_turns_the_rudder_where_a_task_shows_it(tmp_path):
 def test_numbers_beyond_their_bounds_are_refused(name, value):
     with pytest.raises(InputError, match=f"^{name}: .*expected a number"):
         PreviewLQ.from_model(MARINER, **{name: value})
-
-
-@pytest.mark.parametrize("guide", [PreviewLQ, WheelOver])
-def test_a_task_without_a_path_is_refused(guide):
-    with pytest.raises(InputError, match=r"^task: expected one with a path, got"):
-        guide.from_model(MARINER, task=course_keeping_task())
-
-
-def test_gains_on_heel_need_a_task_that_shows_it():
-    with pytest.raises(InputError, match=r"^roll_gain, roll_time: expected 0"):
-        PreviewLQ.from_model(MARINER, roll_gain=0.1)
 
 
 def test_it_leads_lq_alone():

@@ -8,10 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from agents import LQ, benchmark, check_controller, load_agent, register_controller
-from agents.cli import app
 from agents.controllers import registry
 from agents.controllers.controller import Controller
 from agents.controllers.law import Nothing, linear_law
@@ -102,25 +100,6 @@ def test_a_controller_of_ones_own_is_one_file(mine, tmp_path, monkeypatch):
             costs, results[0].figures("my-pd", "sharp-turns-on-model")
         )
         assert (costs > result.figures("lq", "sharp-turns-on-model")).all()
-
-
-def test_the_command_line_finds_a_class_by_its_module(mine, tmp_path):
-    asked = [
-        "benchmark",
-        "--controllers",
-        "my_controllers:PD",
-        "--tasks",
-        "sharp-turns-on-model",
-        "--episodes",
-        "2",
-    ]
-    done = CliRunner().invoke(
-        app, [*asked, "--workers", "2", "--no-page", "--out", str(tmp_path / "out")]
-    )
-    assert done.exit_code == 0, done.output
-    assert "PD" in done.output
-    # its code was run in a process of its own
-    assert "my-pd" not in registry.controller_kinds()
 
 
 def test_what_is_no_controller_is_refused():

@@ -20,10 +20,6 @@ MARINER = load_model("mariner")
 BASES = {
     "lq": (COURSE, LQ.from_model(MARINER)),
     "lqg": (COURSE, LQG.from_model(MARINER)),
-    "ilos-lqg": (
-        PATH,
-        IntegralLineOfSight.from_model(MARINER, autopilot=LQG.from_model(MARINER)),
-    ),
 }
 SHIPS, STEPS, HISTORY, AUTHORITY = 3, 11, 3, 0.4
 
@@ -130,47 +126,6 @@ class Steady:
         return np.full((2, 1), 0.9), len(self.asked)
 
 
-def test_the_base_and_what_is_added_are_no_more_than_the_whole_range():
-    inner, base = Counting(), Steady()
-    residual = ResidualVecEnv(inner, base, authority=0.5)
-    assert residual.reset().tolist() == [[0.0, np.float32(0.9)]] * 2
-    residual.step(np.array([[1.0], [-1.0]]))
-    residual.step(np.array([[0.1], [-9.0]]))
-    assert inner.commanded == [[[1.0], [0.4]], [[0.95], [0.4]]]
-    assert (
-        residual.observation_space.low.tolist(),
-        residual.observation_space.high.tolist(),
-    ) == (
-        [-100.0, -1.0],
-        [100.0, 1.0],
-    )
-    residual.reset()
-    assert (
-        base.asked[0] == base.asked[-1] == (None, [True, True])
-    )  # episodes begin with no state
-    assert base.asked[1:-1] == [(1, [False, False]), (2, [False, False])]
-
-
-def test_an_episode_that_ends_shows_its_last_observations_and_then_those_of_the_next():
-    inner, base = Counting(end=2), Steady()
-    residual = ResidualVecEnv(inner, base, frame_stack=3)
-    proposed = np.float32(0.9)
-    assert residual.reset().tolist() == [[0.0, 0.0, 0.0, proposed]] * 2
-    assert (
-        residual.step(np.zeros((2, 1)))[0].tolist() == [[0.0, 0.0, 1.0, proposed]] * 2
-    )
-    seen, _, dones, infos = residual.step(np.zeros((2, 1)))
-    assert seen.tolist() == [[0.0, 1.0, 2.0, proposed], [-1.0, -1.0, -1.0, proposed]]
-    assert infos[1]["terminal_observation"].tolist() == [0.0, 1.0, 2.0, proposed]
-    assert dones.tolist() == [False, True]
-    seen, *_ = residual.step(np.zeros((2, 1)))
-    assert seen.tolist() == [[1.0, 2.0, 3.0, proposed], [-1.0, -1.0, 3.0, proposed]]
-    assert base.asked[2:4] == [
-        (2, [False, False]),
-        (2, [False, True]),
-    ]  # asked of the end, then of the next
-
-
 def test_rewards_of_a_decision_are_summed_up_to_the_end_of_the_episode():
     for base, after in (
         (None, 1.0),
@@ -217,7 +172,7 @@ def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(tm
         (COURSE, None, {"frame_stack": 0}, "frame_stack: expected .*got 0"),
         (COURSE, None, {"action_repeat": 0}, "action_repeat: expected .*got 0"),
         (COURSE, "lq", {}, "base: expected a controller, .*got str"),
-        (COURSE, BASES["ilos-lqg"][1], {}, "cross_track"),
+        (COURSE, IntegralLineOfSight.from_model(MARINER), {}, "cross_track"),
         (COURSE, LQ.from_model(load_model("kvlcc2")), {}, "base: scale of"),
         (DISCRETE, BASES["lq"][1], {}, "expected actions in a Box .* got Discrete"),
     ],

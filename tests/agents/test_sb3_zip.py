@@ -16,12 +16,12 @@ import torch
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.benchmarking.entries import check_agents, read_entries
+from agents.benchmarking.entries import read_entries
 from agents.policies.sb3_zip import read_sb3
 from agents.suites.suite import BenchmarkTask
 from shipgym import ShipVecEnv
 from shipgym.errors import InputError
-from tests.agents.test_policy_extraction import QUICK, Doubled, one_thread, seen, strong
+from tests.agents.test_policy_extraction import QUICK, one_thread, seen, strong
 
 TASK = BenchmarkTask("calm", "course-keeping", "mariner")
 QUICK_OFF_POLICY = {
@@ -63,32 +63,6 @@ def test_the_commands_are_those_of_torch(kind, settings, tmp_path):
     np.testing.assert_allclose(
         policy.predict(seen(agent))[0], expected, rtol=0.0, atol=1e-6
     )
-
-
-def path_following():
-    return ships("shipgym/PathFollowing-v0")
-
-
-def discrete():
-    return ships("shipgym/CourseKeepingDiscrete-v0")
-
-
-DOUBLED = {"features_extractor_class": Doubled}
-#: Agents that would steer otherwise than they learned: environment, keywords, message.
-REFUSED = {
-    "scaled": (lambda: VecNormalize(ships()), {}, r"train with norm_obs=False"),
-    "extractor": (ships, {"policy_kwargs": DOUBLED}, "'features_extractor_class'"),
-    "other action": (discrete, {}, "expected 1 outputs .* got 9"),
-}
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_what_would_steer_otherwise_than_it_learned_is_refused(name, tmp_path):
-    env, keywords, message = REFUSED[name]
-    _, path = saved(tmp_path, env=env(), **keywords)
-    (one,) = read_entries(str(path))
-    with pytest.raises(InputError, match=rf"model\.zip.*{message}"):
-        check_agents(one, [TASK])
 
 
 class Touch:
