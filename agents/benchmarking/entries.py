@@ -5,7 +5,7 @@ A controller is named, on the command line and in Python, as
     pid                   a classical controller, designed for the model of each task
     tuned-pid             the same with the settings of direct search for the task
     tuned-best            of these, the one with the lowest cost in each task
-    ppo                   the shipped agents of agents/pretrained
+    ppo                   the shipped agent of the environment (agents/pretrained)
     runs/agent.json       a file of an agent or controller
     runs/model.zip        an agent as stable-baselines3 saves it
     runs/{task}-*.json    one file for each task; several that match are training runs
@@ -40,7 +40,7 @@ from shipgym.errors import InputError
 from shipgym.files import LARGEST_TENSORS, read_bytes
 from shipgym.python_files import working_folder
 
-LEARNED = ("ppo", "sac", "td3", "tqc")
+SHIPPED = "ppo"  # agents of agents/pretrained, one for each environment
 TUNED = "tuned-"
 
 
@@ -103,7 +103,7 @@ class Entry:
 def known_names() -> tuple[str, ...]:
     """Names that stand for a controller, other than files and functions."""
     tuned_names = [TUNED + kind for kind in ("best", *CLASSICAL)]
-    return (*controller_kinds(), *LEARNED, *tuned_names)
+    return (*controller_kinds(), SHIPPED, *tuned_names)
 
 
 def names_code(text: str) -> bool:
@@ -265,8 +265,7 @@ def _policies(source: Any, task: BenchmarkTask) -> list[Policy]:
 
     files = source_files(source, task)
     if not files:
-        what = f"shipped {source} agent" if source in LEARNED else f"file '{source}'"
-        raise InputError(f"there is no {what} for task '{task.name}'")
+        raise InputError(f"there is no file of '{source}' for task '{task.name}'")
     return [_read_policy(path, task) for path in files]
 
 
@@ -331,7 +330,7 @@ def source_files(text: str, task: BenchmarkTask) -> list[Path]:
     """Files from which a text's controllers are made for a task, in order."""
     if names_code(text):
         return _module_files(text)
-    if text in LEARNED:
+    if text == SHIPPED:
         agent = PRETRAINED / f"{task.environment}-{text}.json"
         return [agent] if agent.is_file() else []
     if text in known_names():

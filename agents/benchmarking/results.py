@@ -95,8 +95,10 @@ class BenchmarkResult:
         """Sentences about the controllers that failed or could not run a task."""
         failures = []
         for name, about in self.summary["controllers"].items():
-            for task, why in about["refused"].items():
-                failures.append(f"{name} could not run {task}: {why}")
+            if about["refused"]:
+                first, *_ = about["refused"].values()
+                tasks = ", ".join(about["refused"])
+                failures.append(f"{name} could not run {tasks}: {first}")
             for task in self.tasks:
                 cell = self.cells(task).get(name)
                 if cell and cell["failed"]:

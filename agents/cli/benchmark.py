@@ -24,7 +24,7 @@ Controllers = Annotated[
     Option(
         help=(
             "What is compared, separated by commas: classical controllers (pid, lq,"
-            " mpc, ...), tuned-pid, shipped agents (ppo), files of agents,"
+            " mpc, ...), tuned-pid, the shipped agent (ppo), files of agents,"
             " module:function, name=...; default: all classical ones."
         )
     ),

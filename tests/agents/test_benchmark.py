@@ -262,8 +262,7 @@ def test_wrong_controllers_are_refused(given, said):
     [
         ("json:no_such_thing", "got 'json:no_such_thing', which cannot be imported"),
         ("math:pi", r"'math:pi': expected a controller.* got 3.14\d*"),
-        ("td3", "there is no shipped td3 agent for task 'calm'"),
-        ("{task}-x.json", "there is no file '{task}-x.json' for task 'calm'"),
+        ("{task}-x.json", "there is no file of '{task}-x.json' for task 'calm'"),
         (lambda task: 3, "with `predict` for task 'calm', got 3"),
     ],
 )

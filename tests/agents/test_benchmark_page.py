@@ -52,7 +52,7 @@ def test_the_page_holds_its_numbers_and_where_they_are_from(result, page):
         summary["versions"]["numba"],
         "1000000 to 1000004",
         "a &lt;b&gt;lazy one",
-        "none could not run calm: ",
+        "none could not run calm, turns, turns-on-model, turns-far: ",
         "pid,a &lt;b&gt;lazy one=...,none=...",
         "--suite small.toml --episodes 5 --out results",
         "rudder reversals, 1/min",
