@@ -118,7 +118,7 @@ def read_positions(
     if others.size and others.min() > 1.0:
         none |= is_zero
     latitudes[none] = longitudes[none] = np.nan
-    return latitudes, longitudes, np.count_nonzero(none)
+    return latitudes, longitudes, int(none.sum())
 
 
 _NUMBER = r"\d+(?:[.,]\d+)?"

@@ -133,4 +133,4 @@ def _servo(numbers: dict[str, Floats]) -> Command | None:
 
 def _is_pulse_width(values: Floats) -> bool:
     """Return whether values may be pulse widths in us."""
-    return values.min() >= 700.0 and 1000.0 < values.max() <= 2300.0
+    return bool(values.min() >= 700.0 and 1000.0 < values.max() <= 2300.0)

@@ -198,11 +198,11 @@ def without_clock_jumps(t: Floats, x: Floats, y: Floats) -> tuple[Floats, list[s
     for row in np.flatnonzero(steps > max(5.0 * usual, 5.0)).tolist():
         around = np.arange(max(row - 10, 0), min(row + 11, steps.size))
         around = around[around != row]
-        speed = float(np.median(moved[around] / steps[around]))
-        with np.errstate(over="ignore"):
+        with np.errstate(all="ignore"):
+            speed = float(np.median(moved[around] / steps[around]))
             is_far_too_short = moved[row] < 0.2 * speed * steps[row]
         as_usual = moved[row] < 2.0 * moved[around].max()
-        if speed < 1.0 or not as_usual or not is_far_too_short:
+        if not speed >= 1.0 or not as_usual or not is_far_too_short:
             continue
         surplus = float(steps[row]) - usual
         shifts[row + 1 :] += surplus

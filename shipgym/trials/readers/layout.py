@@ -13,7 +13,7 @@ from shipgym.trials.units import split_unit
 BLANKS = " "  # for a delimiter: any number of them
 
 _VALUE = re.compile(
-    r"\W*(?:[NSEWPR]|STBD|STB|BB|PORT|STARBOARD)?\W*\d.*", re.IGNORECASE
+    r"\W*(?:(?:[NSEWPR]|STBD|STB|BB|PORT|STARBOARD)\W*)?\d.*", re.IGNORECASE
 )
 _UNIT_WORDS = re.compile(
     r"\W*|[\[(].*[\])]|utc|gmt|local|(?:[ymdhsf]+\W*){2,}|string|text|float|double|int"

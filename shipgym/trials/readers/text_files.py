@@ -129,7 +129,7 @@ def _by_words(content: bytes) -> tuple[str, str] | None:
 def _foreign_words() -> set[str]:
     """Names of columns without Latin letters."""
     languages = shipped_toml("shipgym.trials.guesses", "column_names.toml")
-    words = set()
+    words: set[str] = set()
     for names in languages.values():
         for patterns in names.values():
             words.update(pattern.strip("*") for pattern in patterns)
