@@ -288,7 +288,7 @@ def test_a_process_that_is_killed_is_resumed(tmp_path):
     process = subprocess.Popen(
         [sys.executable, "-m", "agents.cli", *words], env={**os.environ}
     )
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + 180.0
     while not (run / "checkpoint.pt").exists() and time.monotonic() < deadline:
         assert process.poll() is None
         time.sleep(0.05)
