@@ -150,12 +150,12 @@ def _has_rudder(guess: TrialGuess) -> bool:
 def _shared_columns(guessed: list[TrialGuess]) -> list[ColumnGuess]:
     """Columns that are the same in all logs."""
     first, *others = guessed
-    shared = []
-    for one in first.columns:
-        declaration = (one.channel, one.declaration)
-        if all(declaration in _declarations(other) for other in others):
-            shared.append(one)
-    return shared
+    declared = [_declarations(other) for other in others]
+    return [
+        one
+        for one in first.columns
+        if all((one.channel, one.declaration) in each for each in declared)
+    ]
 
 
 def _declarations(guess: TrialGuess) -> set[tuple[str, str]]:
@@ -188,10 +188,9 @@ def _entry(
     guess: TrialGuess, shared: list[ColumnGuess], folder: Path
 ) -> dict[str, Any]:
     """A log for the template of the ship file."""
-    own = [one for one in guess.columns if one not in shared]
     of_trial = [one.choices for one in guess.decisions if one.section == "trials"]
     known = {(one.channel, one.declaration) for one in shared}
-    own = [one for one in own if (one.channel, one.declaration) not in known]
+    own = [one for one in guess.columns if (one.channel, one.declaration) not in known]
     return {
         "file": _toml_path(guess.path, folder),
         "columns": own,
@@ -228,11 +227,8 @@ def _service_speed(guessed: list[TrialGuess]) -> float | None:
 
     speeds = []
     for one in guessed:
-        trial = one.trial
-        for channel in ("u", "stw", "sog"):
-            if trial is not None and channel in trial.channels:
-                speeds.append(float(np.quantile(trial[channel], 0.9)))
-                break
+        if one.trial is not None and "u" in one.trial:
+            speeds.append(float(np.quantile(one.trial["u"], 0.9)))
     return max(speeds, default=None)
 
 

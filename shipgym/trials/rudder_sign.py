@@ -16,8 +16,7 @@ from shipgym.errors import InputError
 from shipgym.trials.resampling import Log, usual_step
 from shipgym.trials.units import DEGREE
 
-#: Share of logs in which the side may be named wrongly: measured by
-#: scripts/rudder_sign.py.
+#: Share of simulated logs in which the side was named wrongly, at most.
 _ERROR_RATE = 0.01
 
 _FEWEST_WINDOWS = 3
