@@ -304,7 +304,6 @@ def test_pages_name_every_setting_with_its_default(path):
     assert document_settings.page(text) == text, (
         "run python scripts/document_settings.py"
     )
-    assert "| `heading_scale_deg` | 30 | above 0 |" in text
 
 
 @pytest.mark.parametrize(
