@@ -131,7 +131,8 @@ def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
         AttributeError,
         NotImplementedError,
     ) as error:
-        raise InputError(explanation(error, what)) from None
+        functions = [shared.py_func for shared in SHARED.values()]
+        raise InputError(explanation(error, what, functions)) from None
 
 
 def _named(copy: Any) -> Any:
