@@ -96,6 +96,22 @@ class ExpressionWriter:
                 return Expression(variable_name(node.id), self.kinds[node.id])
             case ast.Attribute():
                 return self._member(node)
+            case ast.BinOp() | ast.BoolOp() | ast.UnaryOp():
+                return self._operation(node)
+            case ast.Compare():
+                return self._comparison(node)
+            case ast.IfExp():
+                parts = (node.test, node.body, node.orelse)
+                return choice(*[self.expression(part) for part in parts])
+            case ast.Tuple():
+                return self._structure([self.expression(one) for one in node.elts])
+            case ast.Call():
+                return self._call(node)
+        raise self.refusal(node)
+
+    def _operation(self, node: ast.expr) -> Expression:
+        """Operands with an operator, or one with a sign."""
+        match node:
             case ast.BinOp(op=ast.BitAnd() | ast.BitOr()):
                 return self._logic(node, node.op, [node.left, node.right])
             case ast.BoolOp():
@@ -111,15 +127,6 @@ class ExpressionWriter:
             case ast.UnaryOp(op=ast.Not()):
                 operand = self.expression(node.operand)
                 return Expression(f"!{operand.operand}", bool, is_atom=False)
-            case ast.Compare():
-                return self._comparison(node)
-            case ast.IfExp():
-                parts = (node.test, node.body, node.orelse)
-                return choice(*[self.expression(part) for part in parts])
-            case ast.Tuple():
-                return self._structure([self.expression(one) for one in node.elts])
-            case ast.Call():
-                return self._call(node)
         raise self.refusal(node)
 
     def _member(self, node: ast.Attribute) -> Expression:

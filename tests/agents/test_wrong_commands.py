@@ -6,7 +6,8 @@ import sys
 from pathlib import Path
 
 import pytest
-import wrong_commands
+
+from tests.agents import wrong_commands
 
 ROOT = Path(__file__).parents[2]
 SAMPLE = random.Random(0).sample(list(wrong_commands.lines()), 60)

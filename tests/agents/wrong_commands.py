@@ -1,20 +1,15 @@
 """Wrong command lines, made from the commands' parameters: each gets one message.
 
-    python scripts/wrong_commands.py               all of them
-    python scripts/wrong_commands.py --sample 60   some, drawn
-
 Unknown, missing, empty, repeated and wrongly typed arguments, numbers out of any range,
 names that do not exist, folders for files, files for folders, devices, paths that are
-too long. Fails if one is accepted, exits with another code than 1 or 2, shows a
+too long. A fault is one that is accepted, exits with another code than 1 or 2, shows a
 traceback, says nothing or several things, or leaves a file.
 """
 
 from __future__ import annotations
 
 import os
-import random
 import signal
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,7 +20,7 @@ from typer.testing import CliRunner
 
 from agents.cli import app
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 SHIP = str(ROOT / "examples" / "mariner" / "ship.toml")
 AGENT = str(ROOT / "agents" / "pretrained" / "path-following-ppo.json")
 LONGEST_S = 60  # that a wrong command may take
@@ -207,24 +202,3 @@ def faults(chosen: list[list[str]]) -> dict[str, str]:
         if wrong:
             found[" ".join(text[:60] if text else "''" for text in line)] = wrong
     return found
-
-
-def main(
-    sample: int = typer.Option(0, help="How many, drawn; default: all."),
-    seed: int = typer.Option(0, help="Of the draw."),
-) -> None:
-    """Try wrong command lines."""
-    chosen = list(lines())
-    if sample:
-        chosen = random.Random(seed).sample(chosen, sample)
-    found = faults(chosen)
-    for line, wrong in found.items():
-        print(f"shipgym {line}\n    {wrong}")
-    print(
-        f"{len(chosen)} wrong command lines, {len(found)} not refused as they should be"
-    )
-    sys.exit(bool(found))
-
-
-if __name__ == "__main__":
-    typer.run(main)
