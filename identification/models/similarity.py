@@ -25,15 +25,15 @@ class Features(NamedTuple):
     block_coefficient: float
     length_by_beam: float
     beam_by_draught: float
-    inverse_froude_number: float  # sqrt(g L) / V; as printed L / V, s
+    inverse_froude_number: float  # sqrt(g L) / V
     rudder_area_by_side: float  # rudder area by length and draught
 
 
-def similarity_vector(particulars: Particulars, printed: bool = False) -> Floats:
+def similarity_vector(particulars: Particulars) -> Floats:
     """Features of a ship in the order of `Features`, shape (5,).
 
-    With `printed` the fourth is L/V0 in seconds, as Mei 2019 prints it, in place of
-    sqrt(g L)/V0: then a model of 7 m is like no ship at all.
+    Mei 2019 prints the fourth as L/V0 in seconds, with which a model of 7 m is like no
+    ship at all; here it is sqrt(g L)/V0.
     """
 
     def known(name: str) -> float:
@@ -49,7 +49,7 @@ def similarity_vector(particulars: Particulars, printed: bool = False) -> Floats
         block_coefficient=known("block_coefficient"),
         length_by_beam=L / B,
         beam_by_draught=B / T,
-        inverse_froude_number=L / V if printed else np.sqrt(gravity * L) / V,
+        inverse_froude_number=np.sqrt(gravity * L) / V,
         rudder_area_by_side=known("rudder_area") / (L * T),
     )
     return np.array(features)
