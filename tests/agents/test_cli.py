@@ -122,6 +122,24 @@ def test_wrong_usage_exits_with_2_and_says_why(command):
     assert "Error:" in answer.stderr
 
 
+@pytest.mark.parametrize(
+    ("words", "near"),
+    [
+        (["identfy"], "Did you mean one of identify?"),
+        (
+            ["steer", "lq.json"],
+            "No such command 'steer'. Did you mean one of new-ship,",
+        ),
+        (["export", "x", "--fmi", "2.0"], "No such option: --fmi"),
+        (["export", "x", "--fmi", "2.0"], "--fmu"),
+    ],
+)
+def test_what_does_not_exist_is_refused_with_the_nearest_that_does(words, near):
+    answer = shipgym(*words)
+    assert answer.exit_code == 2
+    assert near in " ".join(answer.stderr.split())
+
+
 def test_identify_writes_model_and_metrics(demo, tmp_path):
     answer = shipgym("identify", demo, "--out", tmp_path / "ship")
     assert answer.exit_code == 0
