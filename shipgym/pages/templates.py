@@ -2,13 +2,13 @@
 
 import json
 from functools import cache
+from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 
-import shipgym
 from shipgym.pages.numbers import NONE, counted, degrees, fixed, number, percent
 from shipgym.plots.style import Figure
 
@@ -46,7 +46,7 @@ def environment() -> Environment:
     made.globals |= {
         "plotly_script": plotly_script,
         "dash": NONE,
-        "version": shipgym.__version__,
+        "version": version("shipgym"),
     }
     made.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     return made
