@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from shipgym.errors import InputError
 
-#: Most characters of a name, a source or a path.
 #: Types of a JSON value; a list of what all entries are, or of what each of several is;
 #: a table by key, or by `ANY_KEY` what all values are.
 Shape: TypeAlias = "tuple[type, ...] | list[Shape] | dict[str, Shape]"

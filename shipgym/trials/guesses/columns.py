@@ -267,7 +267,7 @@ def _is_duration(table: LogTable, column: str, unit: UnitGuess) -> bool:
 
 def _unit_in_cells(table: LogTable, column: str, channel: str) -> UnitGuess | None:
     """Unit that stands in the first cell, as in "13.6 kn"."""
-    first = _first_text(table, column)
+    first = table.first_text(column)
     if table.decimal_comma:
         first = first.replace(",", ".")
     measured = number_with_unit(first)
@@ -281,7 +281,7 @@ def _with_date(
     table: LogTable, time: ColumnGuess, free: list[str], names: _Names
 ) -> ColumnGuess:
     """The time with the column of its date or of the GPS week, where there is one."""
-    first = _first_text(table, time.column)
+    first = table.first_text(time.column)
     is_of_day = _TIME_OF_DAY.fullmatch(first) is not None
     forms = _forms(time.column, "t")
     is_of_week = _matches(forms, ["*tow", "*timeofweek*"])
@@ -300,7 +300,7 @@ def _with_date(
             forms = _forms(column, "t")
             if not _matches(forms, [pattern]):
                 continue
-            date = _first_text(table, column)
+            date = table.first_text(column)
             is_date = _DATE.fullmatch(date) is not None
             if is_of_week:
                 is_date = date.isdigit()
@@ -335,10 +335,6 @@ def _even_column(table: LogTable, free: list[str]) -> ColumnGuess | None:
             reason = f"{unit.reason}; the time, as it increases evenly"
             return ColumnGuess("t", column, unit.unit, reason)
     return None
-
-
-def _first_text(table: LogTable, column: str) -> str:
-    return next(filter(None, table.texts(column)), "")
 
 
 @lru_cache(maxsize=10_000)

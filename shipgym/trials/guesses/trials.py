@@ -161,7 +161,7 @@ def _rudder_side(
     if not {"psi", "delta"} <= trial.channels.keys():
         return None
     if column is not None:
-        first = next(filter(None, table.texts(column.column)), "")
+        first = table.first_text(column.column)
         if table.decimal_comma:
             first = first.replace(",", ".")
         if number_with_side(first) is not None:

@@ -88,6 +88,11 @@ class LogTable:
         texts = [str(cell).strip() for cell in self.column(name)]
         return ["" if is_missing(text) else text for text in texts]
 
+    def first_text(self, name: str) -> str:
+        """The first cell with a value as a stripped text; empty without one."""
+        texts = (str(cell).strip() for cell in self.column(name))
+        return next((text for text in texts if not is_missing(text)), "")
+
     def numbers(self, name: str, *, sided: bool = False) -> Floats:
         """A column as numbers, nan where there is no value.
 
