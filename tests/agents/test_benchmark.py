@@ -130,20 +130,6 @@ def test_what_was_run_is_kept_and_not_run_again(copy, suite):
         )
 
 
-def test_a_part_without_costs_is_refused(copy, suite):
-    for part in (copy / "parts").iterdir():
-        part.write_text(part.read_text().replace('\\"cost\\"', '\\"cots\\"'))
-    said = r"part of 'pid' on 'calm': expected cost and other figures of 4 episodes"
-    with pytest.raises(InputError, match=said):
-        benchmark("pid,lq", suite, "calm", copy, resume=True, episodes=N)
-
-
-@pytest.mark.parametrize("episodes", [0, 101, 2.5])
-def test_as_many_episodes_are_run_as_are_scored_at_most(suite, episodes):
-    with pytest.raises(InputError, match=f"episodes: expected .* got {episodes}"):
-        benchmark("pid", suite, episodes=episodes)
-
-
 def test_a_controller_that_fails_or_cannot_run_a_task_is_named_and_comes_last(suite):
     other = LQ.from_model(load_model("kvlcc2"))
     given = {"other": other, "broken": Broken(), "pid": "pid"}
@@ -523,6 +509,7 @@ def test_bad_input_is_one_message_and_nothing_is_written(suite, tmp_path):
     calm = ["--suite", suite, "--tasks", "calm"]
     for words, said in (
         (["--controllers", "pdi"], "Did you mean 'pid'"),
+        (["--episodes", 101], "--episodes"),
         (["--engine", "rai"], "engine: expected one of 'local', 'ray', got 'rai'"),
         (["--suite", "shipgym-v2"], "Did you mean 'shipgym-v1'"),
         (["--suite", tmp_path / "none.toml"], "there is no such TOML file of a suite"),

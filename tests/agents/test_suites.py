@@ -103,6 +103,11 @@ def test_a_task_travels_as_json():
             "tasks.rough: sea: expected one of .* got 'wild'",
         ),
         ('why = "the easiest"', "far = { noise = 2.0 }", "tasks.calm.far: expected"),
+        (
+            'why = "the easiest"',
+            "limits = { heel = 3.0 }",
+            "tasks.calm.limits: .*heel_deg",
+        ),
         ('name = "mine-v1"', "", "name"),
         ("[tasks.calm]", "[tsks.calm]", "unknown key 'tsks'"),
         ('model = "kvlcc2"', "", "tasks.drift.model: expected .* got None"),
@@ -303,24 +308,3 @@ rudder_reversals_min = 2.0
     metrics = {"heel_deg": statistics, "rudder_reversals_min": statistics}
     assert exceeded(task.limits, metrics) == {"rudder_reversals_min": 3.0}
     assert exceeded(task.limits, {}) == {}
-
-
-@pytest.mark.parametrize(
-    ("limits", "said"),
-    [
-        ("heel = 3.0", "heel_deg"),
-        ("heel_deg = -1.0", "heel_deg: expected a number"),
-        ("heel_deg = true", "heel_deg: expected a number"),
-    ],
-)
-def test_limits_of_unknown_figures_or_values_are_refused(limits, said):
-    text = f"""
-name = "own-v1"
-[tasks.calm]
-environment = "path-following"
-model = "mariner"
-[tasks.calm.limits]
-{limits}
-"""
-    with pytest.raises(InputError, match=rf"own: tasks\.calm\.limits.*{said}"):
-        parse_suite(text, "own")
