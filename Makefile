@@ -51,7 +51,8 @@ release-check: $(VENV)/dev-installed
 	$(BIN)/python scripts/release_check.py
 
 fuzz: $(VENV)/dev-installed
-	OMP_NUM_THREADS=1 $(BIN)/python scripts/fuzz.py
+	OMP_NUM_THREADS=1 $(BIN)/python scripts/fuzz.py --inputs 1000000
+	$(BIN)/python scripts/wrong_commands.py
 
 evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/reproduce.py all --markdown docs/reproduction.md || test $$? = 1  # 1: aims missed, as the page says
