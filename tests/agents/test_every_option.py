@@ -50,6 +50,7 @@ LINES = (
     (f"identify ship.toml {GREY} --kernel rbf --out grey", 0),
     ("identify ship.toml --compare --structures abkowitz --methods ls --out ls", 0),
     (f"advise ship.toml {LINEAR} --criterion c --coefficient N_d --number 1", 0),
+    (f"identify ship.toml {WRONG} --out wrong", 2),
     (f"advise ship.toml {WRONG}", 2),
     (
         f"reduce ship.toml {LINEAR} --tolerance 0.1 --report --out reduced",

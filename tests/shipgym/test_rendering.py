@@ -93,22 +93,6 @@ def test_a_picture_follows_from_seed_and_actions_and_changes_nothing():
     np.testing.assert_array_equal(env.step(action)[0], silent.step(action)[0])
 
 
-def test_readouts_are_in_usual_units():
-    env = make(PATH, model="tanker", action="rudder-shaft", sea=TROUBLED).unwrapped
-    env.reset(seed=0)
-    _, reward, *_, info = env.step(np.array([0.5, 0.8], dtype=np.float32))
-    state = env.physical_state()
-    lines = rendering.readouts(env._engine, 0, state)
-    assert lines["reward"] == f"{reward:+.3f}"
-    assert lines["cross-track"] == f"{info['cross_track']:+.0f} m"
-    assert lines["shaft"] == f"{60.0 * state['n']:.0f} rpm"
-    speed = np.hypot(state["u"], state["v"])
-    assert lines["speed"] == f"{speed:.1f} m/s, {speed / 0.514444:.1f} kn"
-    assert float(lines["heading"][:5]) == pytest.approx(
-        np.degrees(state["psi"]) % 360.0, abs=0.06
-    )
-
-
 def test_a_window_opens_and_closes_without_a_screen(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     env = make(COURSE, render_mode="human")
