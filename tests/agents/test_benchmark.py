@@ -423,14 +423,7 @@ def test_a_suite_of_ones_own_is_run_as_a_shipped_one(own):
             b'"model"',
             "kind: expected 'shipgym-benchmark', got 'model'",
         ),
-        ("results.json", b'"runs": 1', b'"runs": 2', "expected a summary of the epis"),
-        (
-            "results.json",
-            b'"count": 4',
-            b'"count": 5',
-            "expected a summary of the epis",
-        ),
-        ("results.json", b'"rows": 8', b'"rows": 9', "8 rows .* instead of 9"),
+        ("results.json", b'"runs": 1', b'"runs": 2', "got other content"),
         (
             "episodes.parquet",
             b"PAR1",

@@ -80,7 +80,8 @@ def test_a_folder_that_cannot_be_written_is_said_once(tmp_path):
 @pytest.mark.parametrize(
     ("task", "windy"), [("CourseKeeping", True), ("PathFollowing", False)]
 )
-def test_loops_over_ships_are_vectorised(task, windy):
+def test_loops_over_ships_are_vectorised(task, windy, tmp_path, monkeypatch):
+    monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path))  # a loop from a file shows none
     ship = shipgym.load_model("mariner-tls-svm").compiled
     sensors = shipped_sensors(windy, False, False)
     sea = OPEN_SEA if windy else CALM_SEA
