@@ -97,13 +97,15 @@ def nested_changed(random: Random, root: Any) -> Any:
     """Nested values with one place changed; the rest is shared."""
     if not isinstance(root, dict | list) or not root:
         return scaled(random, root) if random.random() < 0.6 else value(random)
-    is_table = isinstance(root, dict)
-    key = random.choice(list(root)) if is_table else random.randrange(len(root))
+    if isinstance(root, dict):
+        name = random.choice(list(root))
+        if random.random() < 0.8:
+            return root | {name: nested_changed(random, root[name])}
+        return in_table(random, root, name)
+    place = random.randrange(len(root))
     if random.random() < 0.8:
-        copy: Any = dict(root) if is_table else list(root)
-        copy[key] = nested_changed(random, root[key])
-        return copy
-    return in_table(random, root, key) if is_table else in_list(random, root, key)
+        return [*root[:place], nested_changed(random, root[place]), *root[place + 1 :]]
+    return in_list(random, root, place)
 
 
 def in_table(random: Random, root: dict[str, Any], key: str) -> dict[str, Any]:

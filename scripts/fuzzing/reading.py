@@ -127,7 +127,7 @@ def _count(report: Report, outcome: str | tuple[str, Fault]) -> None:
         report.read += 1
     elif outcome == "refused":
         report.refused += 1
-    else:
+    elif not isinstance(outcome, str):
         what, fault = outcome
         known = report.faults.setdefault(what, fault)
         known.count += known is not fault

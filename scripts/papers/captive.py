@@ -30,8 +30,9 @@ def oscillate(
     """Let velocities (u, v, r), m/s and rad/s, swing about their mean as a cosine."""
     frequency = 2.0 * np.pi / period_s
     t = period_s / samples * np.arange(cycles * samples + 1, dtype=float)
-    velocity = np.array(mean) + np.outer(np.cos(frequency * t), amplitude)
-    acceleration = -frequency * np.outer(np.sin(frequency * t), amplitude)
+    swing = np.asarray(amplitude, dtype=float)
+    velocity = np.array(mean) + np.outer(np.cos(frequency * t), swing)
+    acceleration = -frequency * np.outer(np.sin(frequency * t), swing)
     return tow(model, t, velocity, acceleration, model_inertia)
 
 
