@@ -136,7 +136,7 @@ def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(site):
                 and unquote(parts.fragment) not in pages[target].anchors
             ):
                 broken.append((path.relative_to(site).as_posix(), link))
-    assert len(pages) > 60
+    assert len(pages) > 30
     assert not broken
 
 
@@ -210,8 +210,8 @@ def test_a_word_is_found(browser, address):
 
 
 def test_figures_are_drawn_when_printed(browser, address):
-    browser.open(f"{address}/reproduction.html")
+    browser.open(f"{address}/real_ships.html")
     pictures = browser.run("document.querySelectorAll('article img').length")
     printed = browser.page.pdf()
-    assert pictures >= 7
+    assert pictures >= 4
     assert printed.count(b"/Subtype /Image") >= pictures
