@@ -48,7 +48,7 @@ def identify_options(
     ] = None,
     preprocessing: Annotated[
         str | None,
-        Option(help="Smoothing of noisy channels: spline, rts or none."),
+        Option(help="Smoothing of noisy channels: spline or none."),
     ] = None,
     method: Annotated[
         str | None,

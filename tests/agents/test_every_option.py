@@ -24,7 +24,7 @@ from shipgym import RecordEpisode, example_ship, load_model
 from tests.agents.small_suite import write_suite
 
 LINEAR = (
-    "--structure abkowitz --method ridge --preprocessing rts --hold-out"
+    "--structure abkowitz --method ridge --preprocessing none --hold-out"
     " zigzag_15_15.csv --current none --wind none --uncertainty analytic"
     " --set alpha=0.01"
 )

@@ -69,7 +69,7 @@ def test_options_come_from_the_ship_file(ship, demo):
             'optimiser = { name = "pso", rounds = 5 }',
             "bounds = [1.0, 1e6]",
             'samples = { rule = "integral", window = 9 }',
-            'preprocessing = "rts"',
+            'preprocessing = "none"',
             "repair = true",
             'name = "mine"',
             f'hold_out = ["{held}"]',
@@ -82,7 +82,7 @@ def test_options_come_from_the_ship_file(ship, demo):
     assert told["method"]["bounds"] == [1.0, 1e6]
     assert told["method"]["optimiser"] == {"name": "pso", "rounds": 5}
     assert told["samples"] == {"rule": "integral", "window": 9}
-    assert told["preprocessing"] == {"smoothing": "rts", "repair": True}
+    assert told["preprocessing"] == {"smoothing": "none", "repair": True}
     asked = {"covariance": "analytic", "model_error": False}
     assert asked.items() <= told["uncertainty"].items()
     assert (told["wind"], told["hold_out"]) == ("none", [held])
@@ -215,7 +215,7 @@ def test_options_of_the_command_line_reach_the_settings(ship, demo, tmp_path):
         "--set",
         "C=1e4",
         "--preprocessing",
-        "rts",
+        "none",
         "--set",
         "repair=true",
         "--hold-out",
@@ -232,7 +232,7 @@ def test_options_of_the_command_line_reach_the_settings(ship, demo, tmp_path):
         "robust": False,
     }
     assert found["samples"]["window"] == 9
-    assert found["preprocessing"] == {"smoothing": "rts", "repair": True}
+    assert found["preprocessing"] == {"smoothing": "none", "repair": True}
     assert found["hold_out"] == [held]
 
 

@@ -38,7 +38,7 @@ METHODS: Mapping[str, Mapping[str, Any]] = {
     "output-error": {"method": "output-error"},
     "tmils": {"method": "tmils"},
     "nomoto euler": {"method": "ls", "samples": "euler", "structure": "nomoto"},
-    "cv-lssvr rts": {"method": "cv-lssvr", "preprocessing": "rts"},
+    "cv-lssvr": {"method": "cv-lssvr"},
 }
 #: The refinement stops when a step is small, so that its last digits depend on the way.
 TOLERANCES = {"": 1e-7, "output-error: ": 1e-5}

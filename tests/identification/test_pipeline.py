@@ -403,14 +403,14 @@ def test_provenance_and_settings_tell_how_a_model_was_made(
         given,
         Sampling("integral", 4),
         mariner.particulars,
-        preprocessing="rts",
+        preprocessing="none",
         uncertainty=Uncertainty(model_error=False),
     )
     provenance = fit.model.provenance or {}
     assert (provenance["method"], provenance["samples"]) == ("ls-svm", "integral")
     assert provenance["settings"] == {
         "samples": {"rule": "integral", "window": 4},
-        "preprocessing": {"smoothing": "rts", "repair": False},
+        "preprocessing": {"smoothing": "none", "repair": False},
         "guarded": True,
         "method": {"C": 1e5, "robust": True},
     }

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from scipy.interpolate import make_smoothing_spline
@@ -12,12 +10,8 @@ from identification.samples.preprocess import (
     smooth,
     smoothed_channels,
 )
-from identification.samples.preprocess.kinematics import (
-    smooth_kinematics,
-)
 from identification.samples.preprocess.splines import Reinsch
-from shipgym import InputError, ShipModel, Trial
-from shipgym.manoeuvres import zigzag
+from shipgym import InputError, Trial
 
 
 def signal(noise: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -80,37 +74,6 @@ def test_clean_trials_are_left_alone(cao_zigzag: Trial) -> None:
     assert cao_zigzag.raw is cao_zigzag
 
 
-def test_kalman_smoother_makes_velocities_better_and_keeps_the_record(
-    mariner: ShipModel, record: Callable[..., Trial]
-) -> None:
-    run = zigzag(mariner, 20, 20, duration=200, dt=0.1)
-    truth, noisy = record(run, 10), record(run, 10, 1.0, 5)
-    smoothed = smooth_kinematics(noisy)
-    assert smoothed.raw is noisy
-    for channel in ("psi", "r", "u", "v"):
-        before, after = (
-            np.std(trial[channel] - truth[channel]) for trial in (noisy, smoothed)
-        )
-        assert after < 0.7 * before
-
-
-@pytest.mark.parametrize(
-    ("recorded", "better"),
-    [("psi", "psi"), ("r", "r"), ("x y psi r", "x y"), ("v psi r", "v")],
-)
-def test_kalman_smoother_takes_the_channels_there_are(
-    mariner: ShipModel, record: Callable[..., Trial], recorded: str, better: str
-) -> None:
-    run = zigzag(mariner, 20, 20, duration=200, dt=0.1)
-    truth = record(run, 10)
-    noisy = record(run, 10, 1.0, 5)
-    channels = {name: noisy[name] for name in (*recorded.split(), "delta")}
-    smoothed = smooth_kinematics(Trial(noisy.t, channels, name="some"))
-    for channel in better.split():
-        before = np.std(noisy[channel] - truth[channel])
-        assert np.std(smoothed[channel] - truth[channel]) < 0.7 * before
-
-
 @pytest.mark.parametrize("step", [0.1, 10.0])
 @pytest.mark.parametrize(
     ("hole", "missing"),
@@ -148,14 +111,3 @@ def test_channels_are_smoothed_as_named_but_for_the_rudder() -> None:
     )
     with pytest.raises(InputError, match=r"preprocessing: expected .*got 'splines'"):
         smoothed_channels(trial, ["u"], "splines")
-
-
-def test_the_smoother_finds_the_roughness_of_a_long_record() -> None:
-    """The first 500 samples tell; a ship that turns slowly is smoothed more."""
-    t = 2.0 * np.arange(701.0)
-    truth = 0.3 * np.sin(t / 50.0)
-    r = truth + 0.05 * np.random.default_rng(0).standard_normal(701)
-    smoothed = smooth_kinematics(Trial(t, {"r": r}, name="long"))
-    assert np.std(smoothed["r"] - truth) < 0.4 * 0.05
-    with pytest.raises(InputError, match="expected the heading psi or the yaw rate r"):
-        smooth_kinematics(Trial(t, {"u": r}, name="no heading"))

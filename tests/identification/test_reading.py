@@ -47,7 +47,7 @@ def read(table: dict[str, Any]) -> dict[str, Any]:
         ),
         ({"samples.window": 3}, "samples", Sampling(window=3)),
         ({"repair": True}, "preprocessing", Preprocessing(repair=True)),
-        ({"preprocessing": "rts"}, "preprocessing", Preprocessing("rts")),
+        ({"preprocessing": "none"}, "preprocessing", Preprocessing("none")),
         ({"uncertainty": "posterior"}, "uncertainty", Uncertainty("posterior")),
         ({"model_error": False}, "uncertainty", Uncertainty(model_error=False)),
         (
@@ -110,7 +110,7 @@ def test_every_setting_of_every_method_is_an_option_by_its_own_name() -> None:
     ("table", "message"),
     [
         ({"rnak": 3}, r"rnak: .*Did you mean 'rank'\?"),
-        ({"preprocesing": "rts"}, r"Did you mean 'preprocessing'\?"),
+        ({"preprocesing": "none"}, r"Did you mean 'preprocessing'\?"),
         ({"samples.rank": 3}, r"samples\.rank: "),
         ({"rank": 3.5}, r"rank: .*3.5"),
         ({"C": "1e6"}, r"C: .*'1e6'"),

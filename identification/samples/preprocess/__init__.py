@@ -16,7 +16,7 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_flag
 
 #: What `identify` may do with noisy channels.
-PREPROCESSING = ("spline", "rts", "none")
+PREPROCESSING = ("spline", "none")
 
 
 @dataclass(frozen=True)
@@ -25,10 +25,8 @@ class Preprocessing:
 
     Parameters
     ----------
-    smoothing : {"spline", "rts", "none"}
-        Smoothing splines fitted to the noise level; Kalman filter and
-        Rauch-Tung-Striebel smoother, with position and heading; or channels as
-        recorded.
+    smoothing : {"spline", "none"}
+        Smoothing splines fitted to the noise level, or channels as recorded.
     repair : bool
         Whether outliers are replaced and dropouts of up to 10 steps filled first; the
         provenance counts them.
@@ -49,18 +47,12 @@ def smoothed_channels(
 ) -> dict[str, Floats]:
     """Some channels of a trial, smoothed (`Preprocessing`).
 
-    The rudder, which has corners, is left as it is; "rts" smooths a shaft speed by a
-    spline.
+    The rudder, which has corners, is left as it is.
     """
     check_choice(smoothing, PREPROCESSING, "preprocessing")
     kept = {"delta"}
     if smoothing == "none":
         kept = set(names)
-    if smoothing == "rts":
-        from identification.samples.preprocess import kinematics
-
-        trial = kinematics.smooth_kinematics(trial)
-        kept |= {*kinematics.HEADING, *kinematics.PLANE}
 
     channels = {}
     for name in names:
