@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import identification
-from identification.models.methods import METHODS
 from identification.pipeline.options import AUTO
 from identification.pipeline.reading import identify_arguments, read_table
 from shipgym import ShipFile, Trial
@@ -100,57 +99,6 @@ def identify_ship(
     trials, arguments = trials_of(ship, settings)
     with placed(str(ship.path)):
         return identification.identify(trials, **arguments)
-
-
-def compare_ship(
-    ship: ShipFile,
-    settings: Mapping[str, Any],
-    structures: str | None,
-    methods: str | None,
-) -> identification.Comparison:
-    """`compare_methods` on a ship file.
-
-    Parameters
-    ----------
-    ship : ShipFile
-        Its trials are read.
-    settings : mapping
-        From `identification_settings`; their method and its settings do not count, nor
-        does their structure where `structures` are named.
-    structures, methods : str or None
-        Names with commas between them, or "all" for every method; None for the usual
-        ones.
-    """
-    others = {}
-    for name, value in settings.items():
-        stage, _, _ = name.partition(".")
-        if stage != "method":
-            others[name] = value
-    trials, arguments = trials_of(ship, others)
-    if structures:
-        arguments.pop("structure", None)
-    with placed(str(ship.path)):
-        return identification.compare_methods(
-            trials,
-            methods=list(METHODS) if methods == "all" else _names(methods),
-            structures=_structures(structures, ship),
-            **arguments,
-        )
-
-
-def _structures(text: str | None, ship: ShipFile) -> list[Any] | None:
-    """Structures by name, the ship file's own among them."""
-    names = _names(text)
-    own = ship.structure
-    if names is None or own is None:
-        return names
-    return [own if name == own.name else name for name in names]
-
-
-def _names(text: str | None) -> list[str] | None:
-    if not text:
-        return None
-    return [name.strip() for name in text.split(",")]
 
 
 def reduce_ship(

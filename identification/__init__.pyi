@@ -43,15 +43,6 @@ from .models.forces import (
 from .models.prior_knowledge import PriorKnowledge as PriorKnowledge
 from .models.refinement import Refinement as Refinement
 from .pipeline import identify as identify
-from .pipeline.comparison import (
-    Comparison as Comparison,
-)
-from .pipeline.comparison import (
-    compare_methods as compare_methods,
-)
-from .pipeline.comparison import (
-    cross_validate as cross_validate,
-)
 from .pipeline.options import Options as Options
 from .pipeline.result import IdentificationResult as IdentificationResult
 from .report.figures import plots as plots

@@ -26,25 +26,6 @@ def identify_command(
     out: Out,
     *,
     options: dict[str, Any],
-    compare: Annotated[
-        bool,
-        Option(
-            "--compare",
-            help="Fit structures and methods and rank them on held-out trials.",
-        ),
-    ] = False,
-    methods: Annotated[
-        str | None,
-        Option(
-            metavar="NAMES", help="Methods to compare, separated by commas, or all."
-        ),
-    ] = None,
-    structures: Annotated[
-        str | None,
-        Option(
-            metavar="NAMES", help="Structures to compare, separated by commas, or auto."
-        ),
-    ] = None,
     report: Report = False,
 ) -> None:
     """Identify a manoeuvring model from recorded trials.
@@ -53,35 +34,10 @@ def identify_command(
 
     Options not given here are taken from the ship file's table [identify]; if neither
     names a structure, the structure and method that best predict held-out trials are
-    chosen. With --compare, structures and methods are ranked on the held-out trials,
-    and comparison and models are written instead.
+    chosen.
 
     Exits with 1 if the identified model is unstable.
     """
-    read, settings = _chosen(ship, options)
-    if compare or methods is not None or structures is not None:
-        _compare(read, settings, out, (structures, methods))
-    else:
-        _identify(read, settings, out, report)
-
-
-def _chosen(
-    ship: Path, options: dict[str, Any], *unnamed: str
-) -> tuple[ShipFile, dict[str, Any]]:
-    """Read the ship file and the options, those of the command line first.
-
-    `unnamed` is the structure if none is named.
-    """
-    from agents.identifying import identification_settings
-    from shipgym.trials.ship_file import ShipFile
-
-    read = ShipFile.load(ship)
-    return read, identification_settings(read, options, *unnamed)
-
-
-def _identify(
-    read: ShipFile, settings: dict[str, Any], out: Path, report: bool
-) -> None:
     from agents.cli.tables import prediction_table, selection_table
     from agents.cli.terminal import answer, console, identifying, say
     from agents.identifying import identify_ship
@@ -90,6 +46,7 @@ def _identify(
     from identification.pipeline.result import FILES
     from identification.report.page import write_report
 
+    read, settings = _chosen(ship, options)
     with whole_folder(out, FILES) as draft, identifying("identifying"):
         result = identify_ship(read, settings)
         result.save(draft)
@@ -116,6 +73,20 @@ def _identify(
     _check_stable(result)
 
 
+def _chosen(
+    ship: Path, options: dict[str, Any], *unnamed: str
+) -> tuple[ShipFile, dict[str, Any]]:
+    """Read the ship file and the options, those of the command line first.
+
+    `unnamed` is the structure if none is named.
+    """
+    from agents.identifying import identification_settings
+    from shipgym.trials.ship_file import ShipFile
+
+    read = ShipFile.load(ship)
+    return read, identification_settings(read, options, *unnamed)
+
+
 def _check_stable(result: IdentificationResult) -> None:
     """Fail for an unstable model, else warn of what has to be known."""
     from agents.cli.terminal import warn
@@ -129,37 +100,6 @@ def _check_stable(result: IdentificationResult) -> None:
     notes = [f"{trial.name}: {note}" for trial in result.trials for note in trial.notes]
     for warning in [*notes, *model_warnings(result)]:
         warn(warning)
-
-
-def _compare(
-    read: ShipFile,
-    settings: dict[str, Any],
-    out: Path,
-    names: tuple[str | None, str | None],
-) -> None:
-    from agents.cli.tables import selection_table
-    from agents.cli.terminal import answer, console, identifying, say, warn
-    from agents.identifying import compare_ship
-    from agents.output import whole_folder
-    from identification.pipeline.comparison import COMPARISON_FILES
-
-    own = () if read.structure is None else (f"model-{read.structure.name}.json",)
-    with (
-        whole_folder(out, (*COMPARISON_FILES, *own)) as draft,
-        identifying("comparing"),
-    ):
-        found = compare_ship(read, settings, *names)
-        found.save(draft)
-    answer(found.to_dict())
-    console.print(selection_table(found.to_dict()))
-    say(f"\nwritten to {out}: comparison.json, models")
-    for name, reason in found.refused.items():
-        warn(f"{name} was not fitted: {reason}")
-    first = found.ranked[0]
-    if not first.stable or first.error is None:
-        fail(
-            "no method gives a model that stays stable on every held-out trial", FAILED
-        )
 
 
 @with_identify_options

@@ -8,7 +8,6 @@ import numpy as np
 
 from identification.arrays import root_mean_square
 from identification.judging.extrapolation import largest_rudders
-from identification.judging.fit import Fit
 from identification.samples.prediction import predict, predicts_track
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Integers
@@ -280,64 +279,3 @@ def _differs_by_chance(fit: RankedFit, first: RankedFit) -> bool:
     by_chance = min(standard_error, 0.25 * least)
     nothing = 0.02 * least
     return bool(excess <= max(by_chance, nothing))
-
-
-def ranked_fit(
-    results: Sequence[Fit], seen: Metrics, trials: Sequence[Trial]
-) -> RankedFit:
-    """Rank of a method that gave `results`, by what it predicts of trials.
-
-    `seen`: metrics of those held out, by name.
-    """
-    errors = {}
-    for trial in trials:
-        if trial.name in seen:
-            errors[trial.name] = _relative_error(seen[trial.name], trial)
-    known = [error for error in errors.values() if error is not None]
-    mean_error = None
-    if len(known) == len(errors):
-        mean_error = float(np.mean(known))
-
-    first = results[0]
-    provenance = first.model.provenance or {}
-    return RankedFit(
-        structure=provenance["structure"],
-        method=provenance["method"],
-        coefficients=len(first.coefficients),
-        stable=all(result.stable for result in results),
-        ran_away=sum(metrics["diverged"] for metrics in seen.values()),
-        error=mean_error,
-        heading_deg=_mean_degrees(seen, "psi"),
-        yaw_rate_deg_s=_mean_degrees(seen, "r"),
-        errors=errors,
-    )
-
-
-def _relative_error(metrics: Mapping[str, Any], trial: Trial) -> float | None:
-    """Mean error of the channels by their standard deviation.
-
-    None where the simulation ran away.
-    """
-    ratios = []
-    for name, error in metrics["rmse"].items():
-        if error is None:
-            continue
-        deviation = float(np.std(trial[name]))
-        if deviation > 0.0:
-            ratio = error / deviation
-            ratios.append(ratio)
-    if not ratios:
-        return None
-    return float(np.mean(ratios))
-
-
-def _mean_degrees(seen: Metrics, channel: str) -> float | None:
-    """Mean over the trials of the error of an angle, degrees; None for none known."""
-    known = []
-    for metrics in seen.values():
-        error = metrics["rmse"][channel]
-        if error is not None:
-            known.append(error)
-    if not known:
-        return None
-    return float(np.degrees(np.mean(known)))

@@ -48,7 +48,6 @@ LINES = (
     ("look ship.toml --strict --out look.html", 0),
     (f"identify ship.toml {LINEAR} --out linear", 0),
     (f"identify ship.toml {GREY} --kernel rbf --out grey", 0),
-    ("identify ship.toml --compare --structures abkowitz --methods ls --out ls", 0),
     (f"advise ship.toml {LINEAR} --criterion c --coefficient N_d --number 1", 0),
     (f"identify ship.toml {WRONG} --out wrong", 2),
     (f"advise ship.toml {WRONG}", 2),

@@ -11,7 +11,6 @@ from typer.testing import CliRunner
 
 from agents.cli import app
 from agents.identifying import (
-    compare_ship,
     identification_settings,
     identify_ship,
     reduce_ship,
@@ -193,7 +192,6 @@ def test_what_is_wrong_with_trials_is_told_with_the_ship_file(demo):
     settings = identification_settings(ship, {"structure": "cubic"})
     for call in (
         lambda: identify_ship(ship, settings),
-        lambda: compare_ship(ship, settings, None, "ls"),
         lambda: reduce_ship(ship, settings, 0.25),
     ):
         with pytest.raises(InputError, match="channel 'n' is missing") as error:
@@ -234,67 +232,6 @@ def test_options_of_the_command_line_reach_the_settings(ship, demo, tmp_path):
     assert found["samples"]["window"] == 9
     assert found["preprocessing"] == {"smoothing": "none", "repair": True}
     assert found["hold_out"] == [held]
-
-
-def test_compare_ranks_methods_and_writes_their_models(demo, tmp_path):
-    answer = shipgym(
-        "identify",
-        demo,
-        "--out",
-        tmp_path / "out",
-        "--compare",
-        "--methods",
-        "ls,tls-svm,rm-svm",
-        "--json",
-    )
-    assert answer.exit_code == 0
-    told = json.loads(answer.stdout)
-    assert {row["method"] for row in told["ranking"]} == {"ls", "tls-svm"}
-    assert "rm-svm was not fitted" in answer.stderr
-    names = {
-        "comparison.json",
-        "model-ls.json",
-        "model-tls-svm.json",
-    }
-    assert {path.name for path in (tmp_path / "out").iterdir()} == names
-    again = shipgym(
-        "identify", demo, "--out", tmp_path / "again", "--methods", "ls,tls-svm,rm-svm"
-    )
-    rows = [line.split()[0] for line in again.stdout.splitlines() if " stable " in line]
-    assert rows == [row["method"] for row in told["ranking"]]
-    for name in names:
-        assert (tmp_path / "out" / name).read_bytes() == (
-            tmp_path / "again" / name
-        ).read_bytes()
-
-
-def test_compare_ranks_structures_by_both_names(ship, tmp_path):
-    given = (
-        "--structures",
-        "nomoto, mine",
-        "--methods",
-        "ls,tls-svm",
-        "--out",
-        tmp_path / "out",
-    )
-    answer = shipgym("identify", ship(*TABLE.splitlines()), *given)
-    assert answer.exit_code == 0, answer.stderr
-    rows = [
-        tuple(line.split()[:2])
-        for line in answer.stdout.splitlines()
-        if "stable " in line
-    ]
-    assert set(rows) == {
-        (method, name) for method in ("ls", "tls-svm") for name in ("nomoto", "mine")
-    }
-    written = {path.name for path in (tmp_path / "out").glob("model-*")}
-    assert written == {"model-nomoto.json", "model-mine.json"}
-    assert (
-        shipgym(
-            "identify", ship(), "--structures", "nomto", "--out", tmp_path / "no"
-        ).exit_code
-        == 2
-    )
 
 
 def test_without_a_structure_it_is_auto_but_for_what_needs_a_table(ship, tmp_path):

@@ -16,7 +16,6 @@ from identification import (
     StochasticGradient,
     TruncatedLSSVM,
     TunedLSSVM,
-    cross_validate,
     identify,
 )
 from identification.estimators.l_curve import LCurve, corner_rank, gcv_rank
@@ -135,22 +134,6 @@ def test_trials_are_held_out_by_name(
         match=r"hold_out: .*'zigzag_20_10'.*Did you mean 'zigzag_\d0_\d0'",
     ):
         identify(noisy_trials, hold_out=["zigzag_20_10"], **options)
-
-
-def test_cross_validation_predicts_each_trial_by_a_model_of_the_others(
-    noisy_trials: list[Trial], mariner: ShipModel
-) -> None:
-    options = {"particulars": mariner.particulars, "steering": mariner.steering}
-    metrics = cross_validate(noisy_trials, **options)
-    assert list(metrics) == [trial.name for trial in noisy_trials[:3]]
-    alone = identify(noisy_trials[:3], hold_out=["zigzag_20_20"], **options)
-    assert metrics["zigzag_20_20"] == alone.metrics["trials"]["zigzag_20_20"]
-    with pytest.raises(
-        InputError, match="expected at least 2 to fit, to hold one out, got 1"
-    ):
-        cross_validate(noisy_trials[:1], **options)
-    with pytest.raises(InputError, match="folds"):
-        cross_validate(noisy_trials, folds=4, **options)
 
 
 @pytest.mark.parametrize(
