@@ -13,9 +13,6 @@ from identification.design.experiment import (
     advise,
     standard_candidates,
 )
-from identification.design.information import (
-    fisher_information,
-)
 from shipgym import (
     InputError,
     Particulars,
@@ -47,30 +44,6 @@ def recorded(run: Trial, name: str, seed: int = 0) -> Trial:
 
 def gentle(ship: ShipModel, seed: int = 0) -> Trial:
     return recorded(zigzag(ship, 5, 5, duration=600, dt=0.5), "gentle", seed)
-
-
-def test_information_adds_over_trials(ship: ShipModel) -> None:
-    runs = [gentle(ship), recorded(turning_circle(ship, 20, 300, 0.5), "turn")]
-    parts = [
-        build_samples([run], ship.table, PARTICULARS, "integral", 10) for run in runs
-    ]
-    both = build_samples(runs, ship.table, PARTICULARS, "integral", 10)
-    noise = {"r": 1e-9}
-    total = sum(fisher_information(ship, part, noise) for part in parts)
-    np.testing.assert_allclose(fisher_information(ship, both, noise), total, rtol=1e-10)
-    assert np.all(np.linalg.eigvalsh(total) > 0.0)
-
-
-def test_information_is_the_inverse_of_the_covariance_of_least_squares(
-    ship: ShipModel,
-) -> None:
-    samples = build_samples([gentle(ship)], ship.table, PARTICULARS, "integral", 10)
-    X = samples.features["r"]
-    np.testing.assert_allclose(
-        np.linalg.inv(fisher_information(ship, samples, {"r": 4.0})),
-        4.0 * np.linalg.inv(X.T @ X),
-        rtol=1e-8,
-    )
 
 
 def test_the_advised_manoeuvre_really_shrinks_the_error_in_a_refit(

@@ -29,7 +29,6 @@ PARTICULARS = Particulars(
     water_density=1025.0,
 )
 SHIP = xu_ship(PARTICULARS)
-PRIME_MASS = 0.5 * 1025.0 * 28.9**3
 
 
 AHEAD = (5.0, 0.0, 0.0)

@@ -11,17 +11,13 @@ from sklearn.utils.estimator_checks import check_estimator
 
 import shipgym
 from identification import RMSVM, IdentificationResult, identify
-from identification.models.grey_box import chosen_box
 from identification.models.similarity import (
-    check_alike,
     correlations,
     select_reference,
 )
-from identification.samples.folds import of_largest_rudder
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag
-from shipgym.ships.particulars import Particulars
 
 #: Mei 2019, Table 4: block coefficient, L/B, B/T, L/V0 in s, rudder area by L T.
 TABLE_4 = {
@@ -111,21 +107,6 @@ def test_the_tanker_is_most_like_kvlcc2_at_any_scale() -> None:
         assert select_reference(ship)[0] == name
 
 
-def test_a_reference_ship_that_rolls_is_chosen_only_where_roll_is_recorded() -> None:
-    ship = shipgym.load_model("container").particulars
-    assert (
-        select_reference(ship, channels=("u", "v", "r", "p", "phi"))[0] == "container"
-    )
-    assert select_reference(ship, channels=("u", "v", "r"))[0] != "container"
-
-
-def test_too_little_known_to_choose() -> None:
-    with pytest.raises(
-        InputError, match=r"give beam, draught.*or name the reference_model"
-    ):
-        select_reference(Particulars(length=7.0, speed=1.0))
-
-
 def test_the_correction_passes_the_battery_of_scikit_learn() -> None:
     for estimator in (RMSVM(C=10.0), RMSVM(C=10.0, epsilon=0.0)):
         checks = check_estimator(estimator, on_skip=None, on_fail=None)
@@ -206,25 +187,6 @@ def test_the_weight_may_be_judged_by_the_largest_rudder(
     assert error(least) < min(error(0.0), error(0.1 * least))
 
 
-def test_a_reference_ship_is_alike_by_a_correlation_of_a_half() -> None:
-    check_alike("tanker", 0.51, "leave it")
-    with pytest.raises(
-        InputError,
-        match=r"at least 0\.5, got 'tanker' with 0\.49 as the best; "
-        r"leave it, or name",
-    ):
-        check_alike("tanker", 0.49, "leave it")
-
-
-def test_the_largest_rudder_needs_a_smaller_one(trials: list[Trial]) -> None:
-    assert of_largest_rudder(trials, "folds").tolist() == [False, False, True, True]
-    with pytest.raises(
-        InputError,
-        match=r"folds: expected some trials with less rudder .* reach 20 deg",
-    ):
-        of_largest_rudder(trials[2:], "folds")
-
-
 def test_what_was_chosen_is_told(rm_svm: IdentificationResult) -> None:
     provenance = rm_svm.model.provenance or {}
     assert provenance["reference"] == {
@@ -237,15 +199,6 @@ def test_what_was_chosen_is_told(rm_svm: IdentificationResult) -> None:
         0.0 <= chosen["epsilon"] <= 1.0 for chosen in provenance["search"].values()
     )
     assert "bare reference ship 'kvlcc2'" in rm_svm.summary()
-
-
-def test_the_search_for_the_bands_ends_where_it_is_best(
-    rm_svm: IdentificationResult,
-) -> None:
-    chosen = (rm_svm.model.provenance or {})["search"]
-    for q, search in rm_svm.searches.items():
-        assert search.x.tolist() == search.course[-1].tolist() == [chosen[q]["epsilon"]]
-        assert list(search.history) == sorted(search.history, reverse=True)
 
 
 @pytest.fixture(scope="module")
@@ -315,24 +268,3 @@ def test_what_does_not_fit_is_refused(
             particulars=target.particulars,
             reference_model=reference,
         )
-
-
-def test_the_most_similar_ship_is_not_taken_unnamed_where_she_is_not_alike() -> None:
-    ship = Particulars(
-        length=100.0,
-        beam=10.0,
-        draught=5.0,
-        block_coefficient=0.45,
-        speed=10.0,
-        rudder_area=8.0,
-    )
-    run = Trial(np.arange(3.0), {c: np.ones(3) for c in ("u", "v", "r", "delta")})
-    with pytest.raises(
-        InputError,
-        match=r"expected a ship like this one, .* choose structure \"abkowitz\" or",
-    ):
-        chosen_box("auto", ship, [run])
-    box, found = chosen_box("kvlcc2", ship, [run.with_channels({"n": np.ones(3)})])
-    assert (box.ship.name, box.shaft, found) == ("kvlcc2", True, {})
-    assert not chosen_box("kvlcc2", ship, [run])[0].shaft  # which is not recorded
-    assert not chosen_box("kvlcc2", ship, [])[0].shaft

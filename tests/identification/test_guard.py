@@ -14,27 +14,6 @@ from shipgym import ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 
 
-def runaway(model: ShipModel) -> ShipModel:
-    """The ship with yaw damping turned into its opposite."""
-    return replace(
-        model, coefficients=model.coefficients | {"N_r": -model.coefficients["N_r"]}
-    )
-
-
-def test_the_reference_ship_passes(mariner: ShipModel, cao_zigzag: Trial) -> None:
-    assert reasons_unstable(mariner, [cao_zigzag]) == []
-
-
-def test_a_ship_that_runs_away_is_found_with_the_reason(
-    mariner: ShipModel, cao_zigzag: Trial
-) -> None:
-    reasons = reasons_unstable(runaway(mariner), [cao_zigzag])
-    assert "trial 'zigzag_15_15', open loop" in reasons[0]
-    assert any(
-        "turning circle" in reason for reason in reasons_unstable(runaway(mariner), [])
-    )
-
-
 def test_a_ship_that_resonates_is_found_by_reversing_the_rudder(
     mariner: ShipModel,
 ) -> None:

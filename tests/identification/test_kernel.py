@@ -16,15 +16,8 @@ from identification import (
     RMSVM,
     IdentificationResult,
     KernelResidual,
-    Options,
     identify,
 )
-from identification.models.kernel_fit import (
-    chosen_centres,
-    principal,
-    stabilised,
-)
-from identification.pipeline.routes import reference_options
 from identification.report.page import report_page
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
@@ -36,7 +29,6 @@ from shipgym.models.scaling import scale_model
 from shipgym.ships.kernel_boxes import (
     Kernel,
     KernelBox,
-    gaussians,
     kernel_box,
 )
 from shipgym.ships.particulars import Particulars
@@ -336,117 +328,3 @@ def test_what_cannot_be(
         replace(truth.table, kernel=None)
     with pytest.raises(InputError, match="expected a ManoeuvringModel as reference"):
         replace(truth.table, reference=None)
-
-
-def test_errors_are_weighed_over_a_ship_length_in_the_prime_system(
-    corrected: IdentificationResult,
-) -> None:
-    """A weight of 1 is 1 / (L T U^3) of windows of T on average."""
-    window = np.mean(corrected.samples.duration)
-    unit = 1.0 / (SHIP.length * window * SHIP["speed"] ** 3)
-    for estimator in corrected.estimators.values():
-        assert pytest.approx(1e6 * unit) == estimator.C  # type: ignore[attr-defined]
-    report = (corrected.model.provenance or {})["kernel"]
-    assert (report["length"], report["C"], report["centres"]) == (2.0, 1e6, 32)
-    assert report["heading_errors_held_out"].keys() == {"reference"}
-
-
-SIDES = np.array(
-    [-1.0, -1.0, -1.0, 1.0]
-)  # of drift, turn, rudder and speed seen from the other side
-
-
-def test_centres_are_those_of_samples_brought_to_one_side_and_their_mirror() -> None:
-    """Two groups, a third of both from the other side: their means are found."""
-    random = np.random.default_rng(0)
-    groups = np.repeat([[0.1, 0.4, -0.3, 1.0], [-0.2, 0.8, 0.5, 1.1]], 300, axis=0)
-    around = groups + 1e-3 * random.standard_normal((600, 4))
-    around[::3] *= SIDES
-    offset, scale, centres = chosen_centres(around, 4)
-    assert offset == pytest.approx([0.0, 0.0, 0.0, 1.05], abs=1e-3)
-    assert scale == pytest.approx([*np.sqrt([0.025, 0.4, 0.17]), 0.05], rel=5e-3)
-    np.testing.assert_array_equal(centres[2:], centres[:2] * SIDES)
-    at = (offset + scale * centres[:2])[np.argsort(centres[:2, 0])]
-    assert at == pytest.approx(groups[[300, 0]], abs=1e-3)
-    still = chosen_centres(around * [1.0, 1.0, 1.0, 0.0], 4)[1]
-    assert still[3] == 0.02
-    assert len(chosen_centres(around[:12], 4)[2]) == 4
-    with pytest.raises(
-        InputError,
-        match="at least 15 different samples for 5 centres of the kernel, got 12",
-    ):
-        chosen_centres(around[:12], 5)
-
-
-def test_features_are_the_principal_components_of_samples_of_both_sides() -> None:
-    x = np.random.default_rng(1).standard_normal((400, 4)) * [0.2, 0.4, 0.3, 0.1] + [
-        0.0,
-        0.0,
-        0.0,
-        0.9,
-    ]
-    kernel = principal(Kernel(*chosen_centres(x, 48), np.eye(48)), x)
-    z = (x - kernel.offset) / kernel.scale
-    features = gaussians(np.concatenate([z, z * SIDES]), kernel.centres) @ kernel.basis
-    powers = features.T @ features / len(features)
-    assert kernel.basis.shape == (48, 40)
-    np.testing.assert_allclose(powers, np.diag(np.diag(powers)), atol=1e-9)
-    assert np.all(np.diff(np.diag(powers)) < 0.0)
-    norms = kernel.basis.T @ gaussians(kernel.centres, kernel.centres) @ kernel.basis
-    np.testing.assert_allclose(norms, np.eye(40), atol=1e-5)
-
-
-def linear_ship(**changes: float) -> ShipModel:
-    """A linear ship in the prime system, of which some coefficients are given."""
-    return ShipModel("linear ship", "linear", SHIP, GEAR, LINEAR | changes)
-
-
-def test_the_linear_ship_beneath_a_kernel_is_damped_as_little_as_steadies_her() -> None:
-    steady = linear_ship(a_du=-0.06)
-    assert stabilised(steady).coefficients == steady.coefficients
-    assert stabilised(linear_ship(a_du=0.3, a_0=0.01)).coefficients[
-        "a_du"
-    ] == pytest.approx(-0.07)
-    for given in ({"b_v": 0.4, "c_r": 0.2}, {"c_d": 9.0}, {"b_d": -3.0, "c_d": 0.0}):
-        ship = linear_ship(**given)
-        found = stabilised(ship).coefficients
-        shift = ship.coefficients["b_v"] - found["b_v"]
-        assert shift == pytest.approx(ship.coefficients["c_r"] - found["c_r"])
-        steady_at = [worst_of(ship, damping) < 1.0 for damping in (shift, shift - 0.05)]
-        assert steady_at == [True, False]
-    with pytest.raises(
-        InputError, match="a linear ship beneath it that some damping stabilises"
-    ):
-        stabilised(linear_ship(c_d=1e4))
-    # by 100 in the prime system at most: a turn of 1.2 takes c_d limit / 1.2 of it
-    assert stabilised(linear_ship(c_d=190.0)).coefficients["c_r"] < -90.0
-    with pytest.raises(
-        InputError, match="a linear ship beneath it that some damping stabilises"
-    ):
-        stabilised(linear_ship(c_d=205.0))
-
-
-def worst_of(ship: ShipModel, damping: float) -> float:
-    """Bounds of the linear ship: roots at -0.2, a drift of 0.5, a turn of 1.2."""
-    c = ship.coefficients
-    A = np.array([[c["b_v"], c["b_r"]], [c["c_v"], c["c_r"]]]) - damping * np.eye(2)
-    drift, turn = np.linalg.inv(A) @ [c["b_d"], c["c_d"]] * GEAR.limit
-    return max(1.2 + np.linalg.eigvals(A).real.max(), abs(drift) / 0.5, abs(turn) / 1.2)
-
-
-@pytest.mark.parametrize(
-    ("asked", "structure", "method"),
-    [
-        ({}, "linear", "tls-svm"),
-        ({"method": "rm-svm"}, "linear", "ls-svm"),
-        ({"method": "ls-svm", "structure": "norrbin"}, "norrbin", "ls-svm"),
-        ({"method": "rm-svm", "reference_model": "tanker"}, "grey-box", "rm-svm"),
-        ({"method": "rm-svm", "structure": "norrbin"}, "norrbin", "ls-svm"),
-    ],
-)
-def test_beneath_a_kernel_lies_a_linear_ship_unless_another_is_named(
-    asked: dict[str, Any], structure: str, method: str
-) -> None:
-    found = reference_options(Options(kernel=KernelResidual(), **asked))
-    assert (found.structure, found.method) == (structure, method)
-    assert found.kernel is None

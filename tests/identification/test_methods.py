@@ -11,19 +11,12 @@ from sklearn.neighbors import KNeighborsRegressor
 from identification import (
     LSSVM,
     ArtificialBeeColony,
-    MultiInnovationLeastSquares,
     RidgeRegression,
-    StochasticGradient,
     TruncatedLSSVM,
     TunedLSSVM,
     identify,
 )
 from identification.estimators.l_curve import LCurve, corner_rank, gcv_rank
-from identification.models.methods import (
-    METHODS,
-    get_method,
-    make_method,
-)
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 
@@ -157,20 +150,6 @@ def test_a_wrong_method_or_setting_is_named(
 ) -> None:
     with pytest.raises(InputError, match=message):
         identify([cao_zigzag], method=method, particulars=mariner.particulars)
-
-
-def test_a_name_stands_for_the_default_object_of_a_method() -> None:
-    for name in METHODS:
-        method = get_method(name)
-        assert method.name == name
-        assert method.name == get_method(make_method(name)).name
-    assert get_method(MultiInnovationLeastSquares(inverse_free=False)).name == "mils"
-    assert get_method(StochasticGradient(omega=0.1)).name == "nisg"
-    assert get_method(TunedLSSVM(optimiser={"name": "pso", "rounds": 3})).name == (
-        "pso-lssvr"
-    )
-    guarded = [get_method(one).regularised for one in (LSSVM(), "rls", Ridge())]
-    assert guarded == [True, False, True]
 
 
 def test_an_estimator_object_is_a_method(

@@ -7,20 +7,13 @@ import pytest
 from certainty import PARTS, case
 
 from identification import IdentificationResult, Samples, Uncertainty, identify
-from identification.estimators.covariance import without_trials
 from identification.estimators.rm_svm import RMSVM
 from identification.judging.closed_loop import closed_loop
-from identification.judging.model_error import (
-    DEFAULT,
-)
 from identification.judging.warnings import held_out_error
-from identification.models.grey_box import chosen_box
-from identification.models.methods import fit_all, get_method
 from identification.samples.prediction import predict
-from shipgym import InputError, ShipModel, Trial, load_model
+from shipgym import ShipModel, Trial, load_model
 from shipgym.manoeuvres import zigzag, zigzag_indices
 from shipgym.models.simulate import simulate
-from tests.ships.mmg import mmg_ship
 
 
 def made_up(n: int = 60) -> Samples:
@@ -35,22 +28,6 @@ def made_up(n: int = 60) -> Samples:
         np.arange(n) * 3 // n,
         1,
     )
-
-
-@pytest.mark.parametrize("method", ["ls", "ridge", "ls-svm"])
-def test_leaving_a_trial_out_of_the_normal_equations_is_a_fit_without_it(
-    method: str,
-) -> None:
-    samples = made_up()
-    found, rest = without_trials(
-        fit_all(get_method(method).make, samples), samples, [1]
-    )
-    anew = fit_all(
-        get_method(method).make,
-        rest,
-    )
-    np.testing.assert_allclose(found["r"].coef_, anew["r"].coef_, rtol=1e-4)
-    assert len(rest) == 40
 
 
 def test_intervals_hold_the_truth_of_a_ship_of_other_equations() -> None:
@@ -73,15 +50,6 @@ def test_the_covariance_in_the_model_is_the_scaled_one(
     )
     assert "model_error" not in bare.model.provenance
     assert "scaled by" in scaled.summary()
-
-
-def test_too_few_trials_have_the_documented_factor(
-    cao_fit: IdentificationResult,
-) -> None:
-    """And its own errors, those of an exact record, ask for less."""
-    error = cao_fit.model.provenance["model_error"]
-    assumed = {"factor": DEFAULT, "how": "assumed: too few trials to leave one out (1)"}
-    assert error == {**assumed, "fitted": {"motion": 1e-3, "indices": 1e-3}}
 
 
 def test_closed_loop_overshoots_do_not_depend_on_the_neutral_helm(
@@ -130,19 +98,6 @@ def test_the_worst_errors_on_trials_held_out_are_said(
     assert "(zigzag_15_15)" in said
     overshoot = noisy_fit.metrics["trials"]["zigzag_15_15"]["overshoot_1_deg"]
     assert overshoot["closed_loop"] == pytest.approx(overshoot["measured"], abs=0.5)
-
-
-def test_a_reference_ship_that_is_like_no_ship_at_hand_is_refused() -> None:
-    still = Trial(
-        np.arange(3.0),
-        {c: np.zeros(3) for c in ("u", "v", "r", "delta", "n")},
-        name="t",
-    )
-    with pytest.raises(
-        InputError,
-        match=r"'auto' expected a ship like this one, .* got '\w+' with 0\.04",
-    ):
-        chosen_box("auto", mmg_ship("seiun-maru").particulars, [still])
 
 
 def test_a_correction_left_out_has_an_uncertainty_and_is_said() -> None:

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +12,11 @@ import shipgym
 from identification import (
     LSSVM,
     IdentificationResult,
-    Options,
     Sampling,
     Uncertainty,
     identify,
     write_report,
 )
-from identification.pipeline.pose import pose
 from shipgym import InputError, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
 from shipgym.models.simulate import open_loop
@@ -146,16 +143,6 @@ def test_provenance_tells_where_the_model_came_from(
         {"name": t.name, "sha256": t.sha256, "derived": []} for t in noisy_trials[:3]
     ]
     assert provenance["steering"] == "given"
-
-
-def test_a_model_without_covariance_has_coefficients_of_unknown_error(
-    noisy_fit: IdentificationResult,
-) -> None:
-    bare = replace(noisy_fit, model=replace(noisy_fit.model, covariance=None))
-    assert bare.standard_errors.keys() == noisy_fit.standard_errors.keys()
-    assert np.isnan(list(bare.standard_errors.values())).all()
-    variances = np.square(list(noisy_fit.standard_errors.values()))
-    np.testing.assert_allclose(variances, np.diag(noisy_fit.model.covariance))  # type: ignore[arg-type]
 
 
 def test_metrics_have_the_promised_form(
@@ -349,22 +336,6 @@ def test_wrong_arguments_are_named(
 def test_an_argument_that_does_not_exist_is_refused(cao_zigzag: Trial) -> None:
     with pytest.raises(TypeError, match="rank"):
         identify([cao_zigzag], rank=3)  # type: ignore[call-arg]
-
-
-def test_for_a_form_of_the_yaw_rate_heading_and_rudder_suffice(
-    cao_zigzag: Trial,
-) -> None:
-    channels = {name: cao_zigzag[name] for name in ("psi", "r", "delta")}
-    bare = Trial(cao_zigzag.t, channels, name="bare")
-    ship: Any = {"length": 160.93, "speed": 7.7}
-    (used,) = pose([bare], Options(structure="nomoto", particulars=ship)).used
-    assert (set(used["u"]), set(used["v"])) == ({7.7}, {0.0})
-    for structure, particulars in (
-        ("linear-steering", ship),
-        ("nomoto", {"length": 160.93}),
-    ):
-        with pytest.raises(InputError, match="trial 'bare': channel 'u' is missing"):
-            pose([bare], Options(structure=structure, particulars=particulars))
 
 
 def test_no_trial_to_fit_and_two_of_one_name_are_refused(

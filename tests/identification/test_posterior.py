@@ -9,7 +9,6 @@ import pytest
 
 from identification import Uncertainty, identify
 from identification.judging.posterior import with_posterior
-from identification.judging.sampling import Chains, mixing_of, sample
 from identification.judging.warnings import model_warnings
 from identification.models.sailed import CoefficientPrior
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
@@ -18,35 +17,6 @@ from shipgym.trials.sensors import Sensors
 
 COVARIANCE = np.array([[4.0, 1.8, 0.0], [1.8, 1.0, 0.0], [0.0, 0.0, 0.01]])
 MEAN = np.array([1.0, -2.0, 3.0])
-
-
-def normal(points):
-    off = points - MEAN
-    return -0.5 * np.sum(off * np.linalg.solve(COVARIANCE, off.T).T, axis=1)
-
-
-def test_walkers_sample_a_known_normal_distribution():
-    """From a start that is far off and too narrow; the numbers are those of a seed."""
-    start = np.random.default_rng(0).normal(0.0, 0.1, (64, 3))
-    chains = sample(normal, start, steps=400, seed=1)
-    mixing = mixing_of(chains)
-    assert mixing.is_enough
-    assert mixing.r_hat < 1.05
-    assert mixing.effective_samples > 1000.0
-    assert 0.3 < mixing.acceptance < 0.95
-    errors = np.sqrt(np.diag(COVARIANCE) / mixing.effective_samples)
-    points = chains.points.reshape(-1, 3)
-    assert (np.abs(points.mean(axis=0) - MEAN) < 4.0 * errors).all()
-    np.testing.assert_allclose(np.cov(points.T), COVARIANCE, rtol=0.1, atol=0.02)
-    other = sample(normal, start, steps=4, seed=2)
-    same = sample(normal, start, steps=4, seed=2)
-    np.testing.assert_array_equal(other.points, same.points)
-
-
-def test_walkers_that_never_move_have_not_mixed():
-    rng = np.random.default_rng(0)
-    stuck = np.repeat(rng.standard_normal((1, 40, 2)), 50, axis=0)
-    assert not mixing_of(Chains(stuck, 0.0)).is_enough
 
 
 @pytest.fixture(scope="module")

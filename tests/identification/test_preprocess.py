@@ -8,10 +8,9 @@ from identification.samples.preprocess import (
     noise_level,
     repaired,
     smooth,
-    smoothed_channels,
 )
 from identification.samples.preprocess.splines import Reinsch
-from shipgym import InputError, Trial
+from shipgym import Trial
 
 
 def signal(noise: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -93,21 +92,3 @@ def test_steps_of_one_and_a_half_to_ten_and_a_half_usual_ones_are_filled(
     inside = found.t[59 : 61 + missing]
     np.testing.assert_allclose(np.diff(inside), step * hole / (missing + 1))
     np.testing.assert_allclose(found["u"], 3.0 + 0.01 * found.t)
-
-
-def test_channels_are_smoothed_as_named_but_for_the_rudder() -> None:
-    t, _, values = signal(0.05)
-    trial = Trial(
-        t,
-        {"u": 5.0 + values, "delta": np.where(t % 100.0 < 50.0, 0.1, -0.1)},
-        name="noisy",
-    )
-    found = smoothed_channels(trial, ["u", "delta"], "spline")
-    np.testing.assert_array_equal(found["u"], smooth(t, trial["u"]))
-    assert not np.array_equal(found["u"], trial["u"])
-    np.testing.assert_array_equal(found["delta"], trial["delta"])
-    np.testing.assert_array_equal(
-        smoothed_channels(trial, ["u"], "none")["u"], trial["u"]
-    )
-    with pytest.raises(InputError, match=r"preprocessing: expected .*got 'splines'"):
-        smoothed_channels(trial, ["u"], "splines")

@@ -22,7 +22,6 @@ from identification import (
 from identification.judging.warnings import held_out_error
 from identification.pipeline.result import FILES
 from identification.report.page import report_page
-from identification.report.predictions import prediction_figure
 from shipgym import ShipFile, ShipModel, Trial
 from shipgym.pages import fixed
 
@@ -108,32 +107,6 @@ def test_figures_by_name(
     assert plots(searched).keys() == common
 
 
-def test_the_fit_is_drawn_from_the_regression(truncated: IdentificationResult) -> None:
-    traces = plots(truncated)["fit"].data
-    seen = np.asarray(traces[0].y, dtype=float)
-    seen = seen[np.isfinite(seen)]
-    samples = truncated.samples
-    np.testing.assert_allclose(
-        seen, samples.targets["u"] / samples.duration, atol=1e-7, rtol=1e-4
-    )
-
-
-def test_residuals_come_with_bounds_of_white_noise(
-    truncated: IdentificationResult,
-) -> None:
-    traces = plots(truncated)["residuals"].data
-    bars, bound = traces[0], max(traces[2].y)
-    autocorrelation = truncated.diagnostics["u"].residual_autocorrelation
-    np.testing.assert_allclose(
-        bars.y[: len(autocorrelation)], autocorrelation, atol=1e-6
-    )
-    step = int(
-        np.ceil(truncated.samples.window / max(truncated.samples.window // 2, 1))
-    )
-    rows = -(-len(truncated.samples) // step)
-    assert bound == pytest.approx(1.96 / np.sqrt(rows), rel=1e-6)
-
-
 def test_the_rank_chosen_is_marked_on_the_l_curve(
     truncated: IdentificationResult,
 ) -> None:
@@ -210,44 +183,4 @@ def test_the_summary_prints_each_coefficient_with_its_error(
     assert rows["Y_vdot"][:2] == [
         f"{1e5 * truncated.model.particulars['Y_vdot']:.6g}",
         "1e-5",
-    ]
-
-
-def test_a_turn_is_drawn_to_scale_and_seen_from_its_first_course() -> None:
-    """First to the east: what is ahead is east, what is to starboard is south."""
-    t = np.arange(4.0)
-    channels = {
-        "x": 5.0 - t,
-        "y": 3.0 + t**2,
-        "psi": np.pi / 2.0 + 0.1 * t,
-        "r": 0.1 + 0.0 * t,
-        "delta": 0.2 * t,
-    }
-    turn = Trial(t, channels, kind="turning-circle")
-    predicted = turn.with_channels({"x": 5.0 - 2.0 * t})
-    *lines, measured, ours = prediction_figure(turn, predicted).data
-    assert [line.name for line in lines] == ["measured", "predicted"] * 2 + [
-        "measured"
-    ]  # u, v are not known
-    np.testing.assert_allclose(lines[-1].y, np.degrees(0.2 * t), rtol=1e-6)
-    np.testing.assert_allclose([measured.x, measured.y], [t, t**2], atol=1e-5)
-    np.testing.assert_allclose([ours.x, ours.y], [2.0 * t, t**2], atol=1e-5)
-    layout = prediction_figure(turn, predicted).layout
-    assert (layout.xaxis6.title.text, layout.yaxis6.title.text) == (
-        "to starboard, m",
-        "along the first course, m",
-    )
-    assert (layout.yaxis6.scaleanchor, layout.yaxis6.scaleratio) == ("x6", 1)
-    straight = prediction_figure(Trial(t, channels, kind="zigzag"), None)
-    np.testing.assert_allclose(
-        [straight.data[-1].x, straight.data[-1].y], [t**2, t], atol=1e-5
-    )
-    assert straight.layout.yaxis6.autorange == "reversed"
-    assert {line.name for line in straight.data} == {"measured"}
-    assert [straight.layout[f"xaxis{k}"].title.text for k in (1, 2, 3, 4, 5)] == [
-        "",
-        "",
-        "",
-        "time, s",
-        "time, s",
     ]

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.samples.gear_response import GearResponse
 from identification.samples.rudder import estimated_gear, rebuild
 from shipgym import ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
@@ -86,17 +85,3 @@ def test_limit_of_an_estimated_gear_is_the_largest_recorded_angle() -> None:
     )
     assert gear.rudder_limit_deg == pytest.approx(42.0)
     assert gear.rudder_rate_deg_s == pytest.approx(4.0)
-
-
-def test_a_gear_of_rate_and_lag_ramps_and_then_creeps() -> None:
-    """0.1 rad/s and 2 s: to an order of 0.5 it ramps to 0.3, then exp(-t / 2)."""
-    gear = GearResponse(0.1, 2.0)
-    angles = gear.angle(0.0, 0.5, np.array([1.0, 3.0, 5.0]))
-    np.testing.assert_allclose(angles, [0.1, 0.3, 0.5 - 0.2 * np.exp(-1.0)])
-    ramping = gear.angle(0.0, -np.inf, np.array([1.0, 9.0]))
-    np.testing.assert_allclose(ramping, [-0.1, -0.9])
-    at_order = GearResponse(0.1, 0.0).angle(0.2, 0.2, np.array([4.0]))
-    np.testing.assert_allclose(at_order, [0.2])
-    t = np.array([0.0, 1.0, 3.0, 5.0])
-    orders = gear.orders(t, gear.angle(0.0, 0.5, t))
-    np.testing.assert_allclose(orders, [np.inf, np.inf, 0.5])

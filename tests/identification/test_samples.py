@@ -9,7 +9,6 @@ import pytest
 from identification import IdentificationResult, Samples, build_samples, identify
 from identification.samples.integrals import (
     broken_spline,
-    step_integrals,
 )
 from identification.samples.rudder import straight
 from shipgym import InputError, ShipModel, Trial
@@ -133,16 +132,6 @@ def test_a_record_of_nothing_but_gaps_is_refused(
     message = r"holes\.csv': expected 10 samples somewhere .* got 2[45] gaps"
     with pytest.raises(InputError, match=message):
         build_samples([without(cao_zigzag, *holes)], mariner.table, mariner.particulars)
-
-
-def test_euler_takes_the_start_of_each_step_and_the_trapezoid_rule_its_mean() -> None:
-    """Steps of 1 and 3 s; a moment is the integral times half the step."""
-    t, channels = np.array([0.0, 1.0, 4.0]), {"u": np.array([2.0, 4.0, 10.0])}
-    for rule, expected in (("euler", [2.0, 12.0]), ("integral", [3.0, 21.0])):
-        found = step_integrals(t, channels, lambda c: {"u": c["u"][:, None]}, rule)
-        np.testing.assert_allclose(found.terms["u"][:, 0], expected)
-        moments = np.multiply(expected, [0.5, 1.5])
-        np.testing.assert_allclose(found.moments["u"][:, 0], moments)
 
 
 @pytest.mark.parametrize(

@@ -48,17 +48,6 @@ def test_with_the_noise_of_instruments_they_come_within_one_per_cent(rows):
     assert all(row.best < 1.0 for row in noisy)
 
 
-def test_the_printed_gradient_is_the_one_of_the_package_on_scaled_columns():
-    """The package's tanh(omega e) / omega, of omega 0, is the plain innovation."""
-    from identification.estimators.recursive import StochasticGradient
-
-    X, y = song2020.regression("norrbin", song2020.trial("norrbin"))
-    ours, _ = song2020.gradient(X[:500], y[:500])
-    np.testing.assert_allclose(
-        StochasticGradient().fit(X[:500], y[:500]).coef_, ours, rtol=1e-9
-    )
-
-
 def test_the_printed_innovation_only_shortens_the_steps():
     """tanh(omega e) of an acceleration is omega e: the path of SG with longer steps."""
     X, y = song2020.regression("nomoto", song2020.trial("nomoto"))

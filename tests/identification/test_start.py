@@ -1,7 +1,5 @@
 """Where predictions start: measured velocities stay, derived ones are estimated."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -44,24 +42,3 @@ def test_noise_of_a_log_leaves_a_start_within_its_own_size():
     found = with_start(ship, as_derived(noisy, {"v": 0.5, "r": 0.008}))
     assert abs(found["v"][0]) < 0.1
     assert abs(found["r"][0]) < 0.001
-
-
-def test_measured_velocities_and_short_records_stay():
-    ship = load_model("mariner")
-    run = zigzag(ship, duration=300.0, dt=1.0)
-    assert with_start(ship, run) is run
-    turn = turning_circle(ship, 20.0, 300.0, 1.0)
-    rare = Trial(
-        turn.t[::20],
-        {name: turn[name][::20] for name in turn.channels},
-        length=turn.length,
-    )
-    short = as_derived(rare, {"v": 0.5})
-    assert with_start(ship, short) is short
-
-
-def test_a_ship_that_runs_away_starts_as_was_recorded():
-    ship = load_model("mariner")
-    wild = replace(ship, coefficients=ship.coefficients | {"N_r": 1.0})
-    log = as_derived(zigzag(ship, duration=300.0, dt=1.0), {"r": 0.008})
-    assert with_start(wild, log) is log

@@ -129,16 +129,6 @@ def recorded(run: Trial, name: str, every: int = 5, use: str = "fit") -> Trial:
     return Trial(run.t[::every], channels, name=name, kind=run.kind, use=use)
 
 
-def zigzags(ship: ShipModel) -> list[Trial]:
-    """To both sides."""
-    plan = ((10, False), (20, True), (35, False))
-    runs = {
-        a: zigzag(ship, a, a, p, duration=600, dt=0.1, must_reverse=False)
-        for a, p in plan
-    }
-    return [recorded(run, f"zigzag_{angle}") for angle, run in runs.items()]
-
-
 def weaves(ship: ShipModel) -> list[Trial]:
     """The rudder to both sides in turn, twenty seconds on each: no loop to compile."""
     sides = np.repeat([1.0, -1.0] * 15, 200)

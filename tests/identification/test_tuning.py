@@ -4,8 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from sklearn.linear_model import Ridge
 
 from identification import (
@@ -76,14 +74,6 @@ def test_search_is_a_function_of_its_seed_and_keeps_its_course(optimiser: Any) -
     np.testing.assert_array_equal(rastrigin(first.course), first.history)
 
 
-def test_bee_colony_of_zhu_is_20_sources_30_rounds_and_limit_20() -> None:
-    colony = ArtificialBeeColony()
-    assert (colony.sources, colony.rounds, colony.limit) == (20, 30, 20)
-    found = colony.minimise(sphere, BOX)
-    assert found.evaluations >= 20 + 30 * (20 + 20)
-    assert len(found.history) == 31
-
-
 @pytest.mark.parametrize("fit_intercept", [True, False])
 @pytest.mark.parametrize("scale", [True, False])
 def test_held_out_error_is_that_of_fits_one_by_one(
@@ -136,26 +126,6 @@ def test_held_out_optimum_is_inside_and_predicts_better_where_data_are_few() -> 
     assert np.median(gains) > 1.5
 
 
-@given(n=st.integers(2, 300), folds=st.integers(2, 12))
-def test_blocks_follow_each_other_in_time_and_are_equally_long(
-    n: int, folds: int
-) -> None:
-    folds = min(folds, n)
-    blocks = time_blocks(n, folds)
-    assert np.all(np.diff(blocks) >= 0)
-    assert np.ptp(np.bincount(blocks, minlength=folds)) <= 1
-
-
-def test_each_trial_may_be_a_block() -> None:
-    np.testing.assert_array_equal(
-        time_blocks(5, "trials", [3, 3, 7, 9, 9]), [0, 0, 1, 2, 2]
-    )
-    with pytest.raises(InputError, match=r"folds: .*2 trials"):
-        time_blocks(5, "trials", [3] * 5)
-    with pytest.raises(InputError, match=r"folds: .*samples \(5\)"):
-        time_blocks(5, 6)
-
-
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
@@ -179,11 +149,3 @@ def test_wrong_settings_are_named(wrong: dict[str, Any], message: str) -> None:
     X, y = regression(40)
     with pytest.raises(InputError, match=message):
         TunedLSSVM(**wrong).fit(X, y)
-
-
-def test_a_particle_is_constricted_as_clerc_and_kennedy_say() -> None:
-    """With pulls of 2.05 the factor is 2 / (phi - 2 + root(phi^2 - 4 phi)), phi 4.1."""
-    swarm, phi = ParticleSwarm(), 4.1
-    factor = 2.0 / (phi - 2.0 + np.sqrt(phi**2 - 4.0 * phi))
-    assert swarm.inertia == pytest.approx(factor, abs=5e-5)
-    assert (swarm.own, swarm.common) == (pytest.approx(2.05 * factor, abs=1e-5),) * 2
