@@ -210,8 +210,8 @@ def test_a_word_is_found(browser, address):
 
 
 def test_figures_are_drawn_when_printed(browser, address):
-    browser.open(f"{address}/real_ships.html")
+    browser.open(f"{address}/environments/course_keeping.html")
     pictures = browser.run("document.querySelectorAll('article img').length")
     printed = browser.page.pdf()
-    assert pictures >= 4
+    assert pictures > 0
     assert printed.count(b"/Subtype /Image") >= pictures
