@@ -44,13 +44,14 @@ def identify_command(
     from agents.output import whole_folder
     from identification.judging.warnings import held_out_error, why_unstable
     from identification.pipeline.result import FILES
-    from identification.report.page import write_report
 
     read, settings = _chosen(ship, options)
     with whole_folder(out, FILES) as draft, identifying("identifying"):
         result = identify_ship(read, settings)
         result.save(draft)
         if report:
+            from identification.report.page import write_report
+
             write_report(result, draft)
         written = [name for name in FILES if (draft / name).exists()]
     instability = why_unstable(result)
@@ -159,7 +160,6 @@ def reduce_command(
     from agents.identifying import reduce_ship
     from agents.output import whole_folder
     from identification.pipeline.result import FILES
-    from identification.report.page import write_report
     from shipgym.files import write_json
 
     read, settings = _chosen(ship, options, "abkowitz")
@@ -171,6 +171,8 @@ def reduce_command(
         fields = found.to_dict()
         found.reduced.save(draft)
         if report:
+            from identification.report.page import write_report
+
             write_report(found.reduced, draft)
         write_json(fields, draft / "reduction.json")
     answer(fields)

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from identification.arrays import column_rms
 from identification.estimators.threads import single_threaded
 from shipgym import InputError
 from shipgym.arrays import Floats
@@ -252,23 +251,6 @@ def keep_solution(
     estimator.noise_variance_ = noise_variance
     estimator.covariance_ = noise_variance * inflation * by_unit_noise
     return residuals
-
-
-def centre_and_scale(
-    X: Floats,
-    scale: bool | ArrayLike,
-    fit_intercept: bool,
-) -> tuple[Floats, Floats]:
-    """Means, zero without intercept, and scales of the features, each (n_features,)."""
-    centre = np.zeros(X.shape[1])
-    if fit_intercept:
-        centre = X.mean(axis=0)
-
-    size = column_rms(X - centre)
-    largest = np.max(np.abs(X), axis=0, initial=0.0)
-    # what is constant is centred to rounding errors, which must not be blown up
-    size[size <= CONSTANT * largest] = 0.0
-    return centre, scales_of(size, scale)
 
 
 def scales_of(size: Floats, scale: bool | ArrayLike) -> Floats:

@@ -16,8 +16,8 @@ class Estimator(Protocol):
     """A linear estimator in scikit-learn's manner.
 
     Optional besides: `rank_` (directions kept), `collinear_groups_` (terms of the
-    directions dropped), `weights_` (of the samples; all equal where absent), `search_`
-    (how settings were chosen) and `chosen_` (the settings chosen, for the provenance).
+    directions dropped), `weights_` (of the samples; all equal where absent), and
+    `chosen_` (the settings chosen, for the provenance).
     """
 
     coef_: Floats  # coefficients of the features as given, shape (n_features,)

@@ -11,12 +11,9 @@ from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sklearn.kernel_ridge import KernelRidge
-from sklearn.utils.validation import check_is_fitted, validate_data
 
 from identification.estimators.decomposition import (
     Decomposition,
-    centre_and_scale,
     check_scale,
     decompose,
     keep_solution,
@@ -28,7 +25,6 @@ from identification.estimators.l_curve import (
 )
 from identification.estimators.linear import LinearRegressor, check_weight, validated
 from identification.estimators.robust import fit_weighted
-from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_flag, check_number, check_whole
 
@@ -42,18 +38,15 @@ class LSSVM(LinearRegressor):
     Parameters
     ----------
     C : float, above 0
-        Weight of the errors; infinity gives least squares (linear kernel only).
-    kernel : {"linear", "rbf"}
-        Linear in primal form; the other solves the dual system by Cholesky
-        decomposition.
+        Weight of the errors; infinity gives least squares.
+    kernel : {"linear"}
+        In primal form.
     scale : bool or array-like of shape (n_features,)
         Divide each feature by its standard deviation (its root mean square without
         intercept), or by the given values, before the penalty acts on the coefficients.
         `coef_` is for the features as given.
     fit_intercept : bool
         Whether b is free or zero.
-    gamma : float or None
-        Of the rbf kernel; 1 / n_features where None.
     robust : bool
         Whether outliers lose their influence: samples are weighted by their residuals
         and fitted again until the weights converge (weighted LS-SVM, Suykens et al.
@@ -62,25 +55,17 @@ class LSSVM(LinearRegressor):
     Attributes
     ----------
     coef_ : array of shape (n_features,)
-        Coefficients of the features as given (linear kernel).
+        Coefficients of the features as given.
     intercept_ : float
         b.
     singular_values_ : array of shape (n_directions,)
-        Of the centred and scaled features (linear kernel).
+        Of the centred and scaled features.
     covariance_ : array of shape (n_features, n_features)
-        Of `coef_`, for exact features and independent errors (linear kernel).
+        Of `coef_`, for exact features and independent errors.
     inverse_moment_ : array of shape (n_features, n_features)
-        Regularised inverse of X'X (X centred): `coef_` is `inverse_moment_ @ X.T @ y`
-        (linear kernel).
+        Regularised inverse of X'X (X centred): `coef_` is `inverse_moment_ @ X.T @ y`.
     noise_variance_ : float
-        From the residuals and the effective degrees of freedom (linear kernel).
-    dual_coef_ : array of shape (n_samples,)
-        Lagrange multipliers (rbf kernel).
-    support_ : array of shape (n_samples, n_features)
-        Centred and scaled samples that the multipliers belong to (rbf
-        kernel).
-    ridge_ : KernelRidge
-        The kernel's matrix and its solution by scikit-learn (rbf kernel).
+        From the residuals and the effective degrees of freedom.
     weights_ : array of shape (n_samples,)
         Of the samples; 1 but for outliers.
     n_features_in_ : int
@@ -94,26 +79,21 @@ class LSSVM(LinearRegressor):
     kernel: str = "linear"
     scale: bool | ArrayLike = True
     fit_intercept: bool = True
-    gamma: float | None = None
     robust: bool = False
 
     def check(self) -> None:
         """Refuse settings that cannot be, by an InputError that names the setting."""
-        kernels = ("linear", "rbf")
-        check_choice(self.kernel, kernels, "kernel")
+        check_choice(self.kernel, ("linear",), "kernel")
         check_weight(self.C)
         check_scale(self.scale)
-        if self.gamma is not None:
-            check_number(self.gamma, "gamma", above=0.0)
         check_flag(self.robust, "robust")
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Fit to samples (n_samples, n_features) and targets (n_samples,)."""
         self.check()
         features, targets = validated(self, X, y)
-        fit_once = self._fit_primal if self.kernel == "linear" else self._fit_dual
         self.weights_ = fit_weighted(
-            lambda weights: fit_once(features, targets, weights),
+            lambda weights: self._fit_primal(features, targets, weights),
             y=targets,
             robust=self.robust,
         )
@@ -141,47 +121,6 @@ class LSSVM(LinearRegressor):
             y=y,
             weights=weights,
         )
-
-    def _fit_dual(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
-        if not np.isfinite(self.C):
-            raise InputError(
-                f"C: expected a finite number with kernel {self.kernel!r}, got {self.C}"
-            )
-        self.centre_, self.scale_ = centre_and_scale(X, self.scale, self.fit_intercept)
-        self.support_ = (X - self.centre_) / self.scale_
-
-        # the free b takes so much of the ones that the multipliers sum to zero
-        ridge = self._kernel_ridge()
-        ones = np.ones(len(y))
-        targets = np.column_stack([y, ones])
-        ridge.fit(self.support_, targets, weights)
-        of_targets, of_ones = ridge.dual_coef_.T
-        self.intercept_ = 0.0
-        if self.fit_intercept:
-            self.intercept_ = float(of_targets.sum() / of_ones.sum())
-        self.dual_coef_ = of_targets - self.intercept_ * of_ones
-
-        ridge.dual_coef_ = self.dual_coef_
-        self.ridge_ = ridge
-        fitted = ridge.predict(self.support_)
-        return np.asarray(y - fitted - self.intercept_)
-
-    def _kernel_ridge(self) -> KernelRidge:
-        return KernelRidge(
-            alpha=1.0 / self.C,
-            kernel=self.kernel,
-            gamma=self.gamma,
-        )
-
-    def predict(self, X: ArrayLike) -> Floats:
-        """Targets, shape (n_samples,), of samples of shape (n_samples, n_features)."""
-        if self.kernel == "linear":
-            return super().predict(X)
-        check_is_fitted(self)
-        features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
-        scaled = (features - self.centre_) / self.scale_
-        without_constant = self.ridge_.predict(scaled)
-        return np.asarray(without_constant + self.intercept_)
 
 
 @dataclass(eq=False, repr=False)

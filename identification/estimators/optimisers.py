@@ -47,7 +47,6 @@ class GridSearch(Optimiser):
             axes = np.linspace(first, last, points).T
             grid = np.meshgrid(*axes, indexing="ij")
             record(np.stack(grid, axis=-1).reshape(-1, len(low)))
-            record.end_round()
             step = (last - first) / (points - 1)
             first = np.maximum(record.x - step, low)
             last = np.minimum(record.x + step, high)
@@ -109,7 +108,6 @@ class ParticleSwarm(Optimiser):
             better = found < values
             best[better] = place[better]
             values[better] = found[better]
-            record.end_round()
 
     def _velocity(
         self,
@@ -180,7 +178,6 @@ class ArtificialBeeColony(Optimiser):
             left = np.flatnonzero(colony.idle > self.limit)
             if left.size:
                 colony.renew(left, _drawn(left.size, low, high, rng), record)
-            record.end_round()
 
 
 @dataclass(eq=False)
@@ -268,7 +265,6 @@ def _start(
     """The first round: candidates drawn in the box, and their values."""
     drawn = _drawn(count, low, high, rng)
     values = record(drawn)
-    record.end_round()
     return drawn, values
 
 

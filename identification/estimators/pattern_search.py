@@ -5,13 +5,12 @@ Optimization 7(1); used by Mei 2019 for the insensitive bands of RM-SVM.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from identification.estimators.search import Recorder, SearchResult
+from identification.estimators.search import Recorder
 from shipgym.arrays import Floats
 
 
@@ -23,7 +22,7 @@ def pattern_search(
     mesh: float = 0.25,
     finest: float = 1.0 / 64.0,
     most_evaluations: int = 200,
-) -> SearchResult:
+) -> Floats:
     """Minimise a function of few variables without derivatives, within bounds.
 
     Each round polls the 2n neighbours on the mesh and moves to the best of them if it
@@ -54,7 +53,6 @@ def pattern_search(
     record = Recorder(values_at)
     first = np.clip(np.asarray(start, dtype=float), lowest, highest)
     record(first[None])
-    record.end_round()
 
     directions = _directions(highest - lowest)
     while mesh >= finest and value_at.cache_info().currsize < most_evaluations:
@@ -63,8 +61,7 @@ def pattern_search(
         record(np.clip(neighbours, lowest, highest))
         if not record.value < before:
             mesh *= 0.5
-        record.end_round()
-    return replace(record.result(), evaluations=value_at.cache_info().currsize)
+    return record.x
 
 
 def _directions(sides: Floats) -> Floats:

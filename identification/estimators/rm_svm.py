@@ -22,7 +22,6 @@ from identification.arrays import column_rms, mean_square, root_mean_square
 from identification.estimators.estimator import Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, validated
 from identification.estimators.pattern_search import pattern_search
-from identification.estimators.search import BAND, SearchResult
 from identification.samples.folds import FOLDS, TRIALS, held_out_rows
 from identification.samples.prediction import predict
 from shipgym import InputError, ShipModel, Trial
@@ -139,7 +138,7 @@ class RMSVM(LinearRegressor):
             )
         tuner = _Tuner(self, task)
         weight = tuner.weight() if self.C is None else float(self.C)
-        bands, search = tuner.bands(weight)
+        bands = tuner.bands(weight)
 
         found: Estimators = {}
         for k, q in enumerate(task.samples.features):
@@ -151,8 +150,6 @@ class RMSVM(LinearRegressor):
                 rows=tuner.everything,
             )
             estimator.chosen_ = {"C": weight, "epsilon": band}
-            if search is not None:
-                estimator.search_ = search.of(k, BAND)
             found[q] = estimator
         return found
 
@@ -247,12 +244,12 @@ class _Tuner:
         errors = [error(weight) for weight in WEIGHTS]
         return float(most_regularised(WEIGHTS, errors))
 
-    def bands(self, weight: float) -> tuple[list[float], SearchResult | None]:
+    def bands(self, weight: float) -> list[float]:
         """The insensitive bands, by a pattern search on simulated headings."""
         first = self.first_bands
         asked = self.asked
         if asked.epsilon is not None or weight == NO_CORRECTION:
-            return first, None
+            return first
 
         def error(bands: Floats) -> float:
             model = self.model(
@@ -266,13 +263,14 @@ class _Tuner:
                 errors.append(own)
             return float(np.mean(errors))
 
-        search = pattern_search(
+        best = pattern_search(
             error,
             start=first,
             low=np.zeros(len(first)),
             high=np.ones(len(first)),
         )
-        return search.x.tolist(), search
+        found: list[float] = best.tolist()
+        return found
 
 
 def most_regularised(

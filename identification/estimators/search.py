@@ -2,56 +2,25 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Self
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 
-LOG_C, BAND = "log10 C", "insensitive band"  # variables of a search
-
 #: Values of candidates, an array of shape (n_candidates, n_dimensions) ->
 #: (n_candidates,).
 Objective = Callable[[Floats], Floats]
 
 
-@dataclass(frozen=True, eq=False)
-class SearchResult:
-    """The outcome of a search.
+class SearchResult(NamedTuple):
+    """The outcome of a search."""
 
-    Attributes
-    ----------
-    x : array of shape (n_dimensions,)
-        The best candidate.
-    value : float
-        Its objective.
-    history : array of shape (n_rounds,)
-        Best objective after each round; the first is that of the starting candidates.
-    course : array of shape (n_rounds, n_dimensions)
-        Best candidate after each round.
-    evaluations : int
-        Number of candidates evaluated.
-    variable : str
-        What a candidate holds: the logarithm of the weight C, or an insensitive band.
-    """
-
-    x: Floats
-    value: float
-    history: Floats
-    course: Floats
-    evaluations: int
-    variable: str = LOG_C
-
-    def of(self, dimension: int, variable: str = LOG_C) -> Self:
-        """The result for one dimension."""
-        return replace(
-            self,
-            x=self.x[[dimension]],
-            course=self.course[:, [dimension]],
-            variable=variable,
-        )
+    x: Floats  # the best candidate, shape (n_dimensions,)
+    value: float  # its objective
+    evaluations: int  # number of candidates evaluated
 
 
 @dataclass(eq=False)
@@ -62,8 +31,6 @@ class Recorder:
     x: Floats = field(default_factory=lambda: np.empty(0))  # the best candidate so far
     value: float = np.inf  # its objective
     evaluations: int = 0
-    _history: list[float] = field(default_factory=list)
-    _course: list[Floats] = field(default_factory=list)
 
     def __call__(self, candidates: Floats) -> Floats:
         """Values of candidates; what is not a number counts as infinitely bad."""
@@ -77,23 +44,6 @@ class Recorder:
             self.x = candidates[best].copy()
             self.value = float(values[best])
         return values
-
-    def end_round(self) -> None:
-        """Write down the best so far."""
-        self._history.append(self.value)
-        self._course.append(self.x)
-
-    def result(self) -> SearchResult:
-        """The search up to now."""
-        history = np.array(self._history)
-        course = np.array(self._course)
-        return SearchResult(
-            x=self.x,
-            value=self.value,
-            history=history,
-            course=course,
-            evaluations=self.evaluations,
-        )
 
 
 class Optimiser(ABC):
@@ -119,7 +69,7 @@ class Optimiser(ABC):
             high=high,
             rng=np.random.default_rng(seed),
         )
-        return record.result()
+        return SearchResult(record.x, record.value, record.evaluations)
 
     @abstractmethod
     def _search(
@@ -129,4 +79,4 @@ class Optimiser(ABC):
         high: Floats,
         rng: np.random.Generator,
     ) -> None:
-        """Evaluate candidates by `record`, and end each round by its `end_round`."""
+        """Evaluate candidates by `record`."""

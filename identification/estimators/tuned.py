@@ -60,8 +60,6 @@ class TunedLSSVM(LinearRegressor):
         As of `LSSVM`.
     C_ : float
         The weight of the errors that was found.
-    search_ : SearchResult
-        How it was found; its variable is log10 C.
     chosen_ : dict
         For the provenance.
     """
@@ -126,7 +124,6 @@ class TunedLSSVM(LinearRegressor):
             seed=self.seed,
         )
         self.C_ = 10.0 ** float(search.x[0])
-        self.search_ = search
         self.chosen_ = {
             "C": self.C_,
             "objective": self.objective,

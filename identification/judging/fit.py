@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
     from identification.estimators.estimator import Estimator
-    from identification.estimators.search import SearchResult
     from identification.judging.diagnostics import EquationDiagnostics
     from identification.samples.samples import Samples
     from shipgym import ShipModel, Trial
@@ -43,9 +42,6 @@ class Fit:
     settings : dict
         The arguments that `identify` was called with, defaults among them, as JSON
         knows them.
-    searches : dict of str to SearchResult
-        How the settings of each equation were found, for methods that search: log10 C,
-        or the insensitive band of RM-SVM.
     """
 
     model: ShipModel
@@ -57,7 +53,6 @@ class Fit:
     samples: Samples
     estimators: dict[str, Estimator]
     settings: dict[str, Any]
-    searches: dict[str, SearchResult] = field(default_factory=dict)
 
     @property
     def coefficients(self) -> dict[str, float]:

@@ -101,12 +101,6 @@ def get_method(method: str | Any) -> Method:
             f"method: expected one of {quoted(METHODS)}, or an estimator with"
             f" scikit-learn's interface, fit(X, y) that sets coef_, got {method!r}"
         )
-    if isinstance(method, LSSVM) and method.kernel != "linear":
-        raise InputError(
-            "method: expected LSSVM with the linear kernel, which has a coefficient for"
-            f" each term, got kernel {method.kernel!r}; write identify(...,"
-            " kernel='rbf') for a ship with a kernel"
-        )
     make = partial(without_constant, method)
     if isinstance(method, LinearRegressor):
         return Method(

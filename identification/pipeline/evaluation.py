@@ -273,7 +273,6 @@ def evaluated(
         samples=problem.samples,
         estimators=fit.estimators,
         settings=whole_call(options, problem.trials),
-        searches=_attributes(fit, "search_"),
     )
 
 

@@ -58,20 +58,16 @@ def test_optimisers_find_the_global_minimum(
 ) -> None:
     found = optimiser.minimise(objective, BOX, seed=3)
     np.testing.assert_allclose(found.x, [1.0, 1.0], atol=2e-3)
-    assert found.value == objective(found.x[None])[0] == found.history[-1]
+    assert found.value == objective(found.x[None])[0]
 
 
 @pytest.mark.parametrize("optimiser", OPTIMISERS, ids=lambda o: type(o).__name__)
-def test_search_is_a_function_of_its_seed_and_keeps_its_course(optimiser: Any) -> None:
+def test_search_is_a_function_of_its_seed(optimiser: Any) -> None:
     first, again, other = (
         optimiser.minimise(rastrigin, BOX, seed) for seed in (1, 1, 2)
     )
-    np.testing.assert_array_equal(first.course, again.course)
-    assert isinstance(optimiser, GridSearch) or not np.array_equal(
-        first.course, other.course
-    )
-    assert np.all(np.diff(first.history) <= 0.0)
-    np.testing.assert_array_equal(rastrigin(first.course), first.history)
+    np.testing.assert_array_equal(first.x, again.x)
+    assert isinstance(optimiser, GridSearch) or not np.array_equal(first.x, other.x)
 
 
 @pytest.mark.parametrize("fit_intercept", [True, False])
