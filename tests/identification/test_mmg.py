@@ -442,22 +442,3 @@ def test_options_it_does_not_have(options: dict[str, Any], message: str) -> None
     trial = sailed(ship_of({}), 20.0, 9.0, 0)
     with pytest.raises(InputError, match=message):
         identify([trial], "mmg", particulars=L7, steering=mmg.SHIP.steering, **options)
-
-
-def test_a_trial_without_shaft_speed_or_with_a_still_rudder_is_refused() -> None:
-    trial = sailed(ship_of({}), 20.0, 9.0, 0)
-    idle = Trial(
-        trial.t, {**trial.channels, "delta": np.zeros(len(trial))}, name="idle"
-    )
-    with pytest.raises(
-        InputError,
-        match=r"'idle': expected a rudder that moves, got one that stays at 0\.00",
-    ):
-        identify([idle], "mmg", particulars=L7)
-    without = Trial(
-        trial.t, {c: v for c, v in trial.channels.items() if c != "n"}, name="still"
-    )
-    with pytest.raises(
-        InputError, match="'still': channel 'n' is missing, structure 'mmg' needs"
-    ):
-        identify([without], "mmg", particulars=L7)

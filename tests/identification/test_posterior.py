@@ -15,9 +15,6 @@ from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.trials.sensors import Sensors
 
-COVARIANCE = np.array([[4.0, 1.8, 0.0], [1.8, 1.0, 0.0], [0.0, 0.0, 0.01]])
-MEAN = np.array([1.0, -2.0, 3.0])
-
 
 @pytest.fixture(scope="module")
 def nomoto() -> ShipModel:

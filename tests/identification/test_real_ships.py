@@ -16,9 +16,7 @@ from real_ships.mmg import CIRCLES, HSVA, OTHERS, circle, fitted
 from identification import PriorKnowledge
 from shipgym import InputError
 
-SHIPS = Path(__file__).parents[1] / "ships"
 MEASURED_RUNS = Path(__file__).parents[2].parent / "shared" / "data"
-PAGE = Path(__file__).parents[2] / "docs" / "real_ships.md"
 
 measured = pytest.mark.skipif(
     not MEASURED_RUNS.is_dir(), reason=f"the measured runs are not at {MEASURED_RUNS}"

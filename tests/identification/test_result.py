@@ -107,17 +107,6 @@ def test_figures_by_name(
     assert plots(searched).keys() == common
 
 
-def test_the_rank_chosen_is_marked_on_the_l_curve(
-    truncated: IdentificationResult,
-) -> None:
-    figure = plots(truncated)["l-curve"]
-    curve = truncated.estimators["u"].l_curve_  # type: ignore[attr-defined]
-    marked = next(trace for trace in figure.data if trace.name == "chosen")
-    rank = truncated.diagnostics["u"].rank
-    assert marked.x[0] == pytest.approx(curve.residual_norm[rank - 1], rel=1e-6)
-    assert marked.y[0] == pytest.approx(curve.solution_norm[rank - 1], rel=1e-6)
-
-
 def test_a_channel_that_never_moves_is_no_trouble(
     mariner: ShipModel, cao_zigzag: Trial
 ) -> None:
