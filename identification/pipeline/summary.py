@@ -18,9 +18,22 @@ from identification.judging.warnings import (
 )
 from identification.text import as_text, lined_table
 from shipgym import ShipModel
+from shipgym.pages.numbers import MINUS, fixed, number
 from shipgym.ships.particulars import ADDED_MASSES
 
 PRIME = 1e-5
+#: Particulars of the ship: name, unit, and the factor to it from the SI unit.
+PARTICULARS = {
+    "length": ("length between perpendiculars", "m", 1.0),
+    "beam": ("beam", "m", 1.0),
+    "draught": ("draught", "m", 1.0),
+    "block_coefficient": ("block coefficient", "", 1.0),
+    "mass": ("mass", "t", 1e-3),
+    "xg": ("centre of gravity forward of midship", "m", 1.0),
+    "yaw_gyradius": ("yaw gyradius", "m", 1.0),
+    "speed": ("service speed", "m/s", 1.0),
+    "water_density": ("water density", "kg/m³", 1.0),
+}
 
 
 def summary_table(fit: Fit) -> str:
@@ -30,7 +43,7 @@ def summary_table(fit: Fit) -> str:
     shown = [
         _headline(fit),
         kernel_text(kernel) if kernel else coefficients_table(fit),
-        _inertia(fit),
+        _quantities_table(fit.model),
     ]
     posterior = provenance.get("posterior")
     error = provenance.get("model_error")
@@ -148,34 +161,35 @@ def coefficients_table(fit: Fit) -> Table:
     return table
 
 
-def _inertia(fit: Fit) -> Table:
-    ship = fit.model.particulars
-    units = {"mass": "kg", "xg": "m", "yaw_gyradius": "m", "speed": "m/s"}
-    units |= dict.fromkeys(ADDED_MASSES, "1e-5")
-    table = lined_table("Inertia and service speed", "name", ">value", "unit", "source")
-    for name, unit in units.items():
-        value = ship[name]
-        if value is None:  # not needed by a structure of accelerations
-            continue
-        if name in ADDED_MASSES:
-            value = value / PRIME
-        source = "estimated" if name in ship.estimated else "given"
-        table.add_row(name, f"{value:.6g}", unit, source)
-    _add_gear(table, fit.model)
+def _quantities_table(model: ShipModel) -> Table:
+    table = lined_table("Ship and steering gear", "name", ">value", "source")
+    for name, source, value in quantities(model):
+        table.add_row(name, value, source)
     return table
 
 
-def _add_gear(table: Table, model: ShipModel) -> None:
-    gear = model.steering
-    provenance = model.provenance or {}
-    source = provenance.get("steering", "given")
-    rows = [
-        ("rudder limit", gear.rudder_limit_deg, "deg"),
-        ("rudder rate", gear.rudder_rate_deg_s, "deg/s"),
-        ("rudder lag", gear.time_constant, "s"),
-    ]
-    for name, value, unit in rows:
-        table.add_row(name, f"{value:.4g}", unit, source)
+def quantities(model: ShipModel) -> list[tuple[str, str, str]]:
+    """Particulars, added masses and steering gear: name, where from, and value."""
+    ship, gear = model.particulars, model.steering
+    rows = []
+
+    def add(name: str, value: str, estimated: bool) -> None:
+        rows.append((name, "estimated" if estimated else "given", value))
+
+    for name, (words, unit, factor) in PARTICULARS.items():
+        value = ship[name]
+        if value is not None:
+            digits = f"{factor * value:.5g}".replace("-", MINUS)
+            add(words, f"{digits} {unit}", name in ship.estimated)
+    for name in ADDED_MASSES:
+        value = ship[name]
+        if value is not None:
+            add(f"{name}, 10⁻⁵", fixed(value / PRIME, 1), name in ship.estimated)
+    estimated = (model.provenance or {}).get("steering") == "estimated"
+    add("rudder limit", f"{number(gear.rudder_limit_deg)} deg", estimated)
+    add("rudder rate", f"{number(gear.rudder_rate_deg_s)} deg/s", estimated)
+    add("rudder lag", f"{number(gear.time_constant, 2)} s", estimated)
+    return rows
 
 
 def _against_reference(fit: Fit) -> Table:

@@ -9,9 +9,8 @@ import numpy as np
 
 from identification.judging.fit import Fit
 from identification.pipeline.summary import PRIME, are_derivatives
-from shipgym import ShipModel, Trial
-from shipgym.pages import MINUS, NONE, fixed, number
-from shipgym.ships.particulars import ADDED_MASSES
+from shipgym import Trial
+from shipgym.pages import NONE, fixed, number
 from shipgym.trials.units import KNOT
 
 FORCES = {
@@ -27,18 +26,6 @@ INDICES = {
     "advance_lengths": ("advance", "L"),
     "transfer_lengths": ("transfer", "L"),
     "tactical_diameter_lengths": ("tactical diameter", "L"),
-}
-#: Particulars of the ship: name, unit, and the factor to it from the SI unit.
-PARTICULARS = {
-    "length": ("length between perpendiculars", "m", 1.0),
-    "beam": ("beam", "m", 1.0),
-    "draught": ("draught", "m", 1.0),
-    "block_coefficient": ("block coefficient", "", 1.0),
-    "mass": ("mass", "t", 1e-3),
-    "xg": ("centre of gravity forward of midship", "m", 1.0),
-    "yaw_gyradius": ("yaw gyradius", "m", 1.0),
-    "speed": ("service speed", "m/s", 1.0),
-    "water_density": ("water density", "kg/m³", 1.0),
 }
 
 
@@ -107,30 +94,6 @@ def trial_row(trial: Trial, name: str) -> TrialRow:
         rudder=rudder,
         speeds=speeds,
     )
-
-
-def quantities(model: ShipModel) -> list[tuple[str, str, str]]:
-    """Particulars, added masses and steering gear: name, where from, and value."""
-    ship, gear = model.particulars, model.steering
-    rows = []
-
-    def add(name: str, value: str, estimated: bool) -> None:
-        rows.append((name, "estimated" if estimated else "given", value))
-
-    for name, (words, unit, factor) in PARTICULARS.items():
-        value = ship[name]
-        if value is not None:
-            digits = f"{factor * value:.5g}".replace("-", MINUS)
-            add(words, f"{digits} {unit}", name in ship.estimated)
-    for name in ADDED_MASSES:
-        value = ship[name]
-        if value is not None:
-            add(f"{name}, 10⁻⁵", fixed(value / PRIME, 1), name in ship.estimated)
-    estimated = (model.provenance or {}).get("steering") == "estimated"
-    add("rudder limit", f"{number(gear.rudder_limit_deg)} deg", estimated)
-    add("rudder rate", f"{number(gear.rudder_rate_deg_s)} deg/s", estimated)
-    add("rudder lag", f"{number(gear.time_constant, 2)} s", estimated)
-    return rows
 
 
 def coefficient_tables(fit: Fit) -> dict[str, list[CoefficientRow]]:

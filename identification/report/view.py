@@ -25,6 +25,7 @@ from identification.pipeline.summary import (
     are_derivatives,
     kernel_text,
     mixing_in_words,
+    quantities,
 )
 from identification.report.predictions import (
     overview_figure,
@@ -36,7 +37,6 @@ from identification.report.tables import (
     TrialRow,
     coefficient_tables,
     index_lines,
-    quantities,
     short_names,
     trial_row,
 )
