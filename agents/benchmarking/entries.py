@@ -7,7 +7,6 @@ A controller is named, on the command line and in Python, as
     tuned-best            of these, the one with the lowest cost in each task
     ppo                   the shipped agent of the environment (agents/pretrained)
     runs/agent.json       a file of an agent or controller
-    runs/model.zip        an agent as stable-baselines3 saves it
     runs/{task}-*.json    one file for each task; several that match are training runs
     my_module:factory     a function that returns a controller for a `BenchmarkTask`,
                           or a subclass of `agents.Controller`; its code is run
@@ -211,7 +210,7 @@ def _short_name(text: str) -> str:
     if names_code(text):
         _, _, function = text.rpartition(":")
         return function
-    if not text.endswith((".json", ".zip")):
+    if not text.endswith(".json"):
         return text
     stem = Path(text).stem
     for wildcard in ("{task}", "*"):
@@ -266,7 +265,7 @@ def _policies(source: Any, task: BenchmarkTask) -> list[Policy]:
     files = source_files(source, task)
     if not files:
         raise InputError(f"there is no file of '{source}' for task '{task.name}'")
-    return [_read_policy(path, task) for path in files]
+    return [load_agent(path) for path in files]
 
 
 def _policy(source: Any, task: BenchmarkTask) -> Policy:
@@ -290,14 +289,6 @@ def _designed(kind: str, task: BenchmarkTask) -> Policy:
     if controller_class(kind).has_autopilot and not task.task.follows_path:
         kind = "lq"
     return design(kind, task)
-
-
-def _read_policy(path: Path, task: BenchmarkTask) -> Policy:
-    if path.suffix != ".zip":
-        return load_agent(path)
-    from agents.policies.sb3_zip import read_sb3
-
-    return read_sb3(path).policy(task.task, task.ship)
 
 
 def _imported(text: str) -> Any:

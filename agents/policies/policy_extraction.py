@@ -37,6 +37,8 @@ class Actor(NamedTuple):
         return f"{self.head or self.body + '.0'}.weight"
 
 
+DENSE = "dense layers with ReLU or Tanh between them"
+
 #: Wrappers that change observations.
 REFUSED = ("VecFrameStack", "VecTransposeImage", "VecExtractDictObs")
 
@@ -179,32 +181,13 @@ def _network(agent: Any) -> Network:
             "agent: expected 'MlpPolicy' without a features extractor, got one with"
             f" {extractor}"
         )
-    check_exploration(getattr(agent, "use_sde", False), "agent: ")
-
-    activation = getattr(policy, "activation_fn", None)
-    name = getattr(activation, "__name__", None)
-    what = f"{type(agent).__name__} with {type(policy).__name__}"
-    return actor_network(policy.state_dict(), name, what)
-
-
-def check_exploration(use_sde: Any, where: str = "") -> None:
-    """Refuse state-dependent exploration, whose policies command by other layers."""
-    if use_sde:
+    if getattr(agent, "use_sde", False):  # commands by other layers
         raise InputError(
-            f"{where}expected an agent without state-dependent exploration, got one"
+            "agent: expected an agent without state-dependent exploration, got one"
             " with it (use_sde)"
         )
 
-
-def actor_network(
-    weights: Mapping[str, Any], activation: str | None, what: str
-) -> Network:
-    """Network that commands, from the tensors of a policy by name.
-
-    `activation`: torch's class between the layers, by default the algorithm's own;
-    `what`: whose they are. Raises InputError for those of another algorithm, and for
-    layers that are not dense.
-    """
+    weights = policy.state_dict()
     actors = (
         Actor("mlp_extractor.policy_net", "action_net", "linear", "Tanh"),  # PPO, A2C
         Actor("actor.latent_pi", "actor.mu", "tanh", "ReLU"),  # SAC, TQC
@@ -214,16 +197,21 @@ def actor_network(
     if not known:
         raise InputError(
             "agent: expected PPO, A2C, SAC, TD3, DDPG or TQC with 'MlpPolicy', got"
-            f" {what}"
+            f" {type(agent).__name__} with {type(policy).__name__}"
         )
     actor = known[0]
-    between = activation or actor.activation
+    activation = getattr(policy, "activation_fn", None)
+    between = getattr(activation, "__name__", actor.activation)
     activation_of = {"ReLU": "relu", "Tanh": "tanh"}
-    dense = "dense layers with ReLU or Tanh between them"
     if between not in activation_of:
-        raise InputError(f"agent: expected {dense}, got {between} as layer 1")
+        raise InputError(f"agent: expected {DENSE}, got {between} as layer 1")
+    layers = _dense_layers(actor, weights)
+    return Network(layers, activation_of[between], actor.output)
 
-    names = _dense_layers(actor, weights)
+
+def _dense_layers(actor: Actor, weights: Mapping[str, Any]) -> tuple[Layer, ...]:
+    """Layers from observation to command; InputError if others act as well."""
+    names = _names_of_layers(actor, weights)
     not_acting = (
         "mlp_extractor.value_net.",
         "value_net.",
@@ -238,7 +226,7 @@ def actor_network(
         used |= {f"{name}.weight", f"{name}.bias"}
     if used != acting:
         raise InputError(
-            f"agent: expected {dense}, got weights missing or unknown:"
+            f"agent: expected {DENSE}, got weights missing or unknown:"
             f" {quoted(sorted(used ^ acting))}"
         )
 
@@ -247,10 +235,10 @@ def actor_network(
         weight = _array(weights[f"{name}.weight"])
         bias = _array(weights[f"{name}.bias"])
         layers.append(Layer(weight, bias))
-    return Network(tuple(layers), activation_of[between], actor.output)
+    return tuple(layers)
 
 
-def _dense_layers(actor: Actor, weights: Mapping[str, Any]) -> list[str]:
+def _names_of_layers(actor: Actor, weights: Mapping[str, Any]) -> list[str]:
     """Names of the layers from observation to command, without activations."""
     layers = []
     for number in count(step=2):

@@ -29,15 +29,13 @@ from agents.job_results import (
     result_to_json,
 )
 from agents.jobs import JobEngine, run_jobs
-from agents.policies.sb3_zip import read_sb3
 from agents.suites.suite import load_suite, parse_suite
 from agents.training.plan import TrainingPlan, make_plan, training_options
 from agents.training.run_folder import resumed
 from agents.training.settings import load_settings, read_settings_file
 from fuzzing.reading import Kind
-from shipgym import Episode, ShipFile, ShipModel, Trial, load_model
+from shipgym import Episode, ShipFile, ShipModel, Trial
 from shipgym.files import LARGEST_TOML, read_bytes
-from shipgym.tasks.task import Task
 from shipgym.trials.guesses import guess_trial
 
 SHOWN = Console(file=io.StringIO(), width=120)
@@ -179,11 +177,6 @@ def read_cell(path: Path) -> Any:
     return collect(SUITE, [TASK], [ENTRY], cells, "pid", {TASK.name: cell})
 
 
-def read_zip(path: Path) -> Any:
-    """An agent of stable-baselines3, as one that learned the first task."""
-    return read_sb3(path).policy(Task.of("CourseKeeping"), load_model("mariner"))
-
-
 KINDS = (
     Kind(
         "ship-file",
@@ -197,7 +190,6 @@ KINDS = (
     Kind("model", ShipModel.load, use_model, slow=2),
     Kind("controller", load_agent, use_agent),
     Kind("policy", load_agent, use_agent, main="agent.json", slow=4),
-    Kind("sb3", read_zip, use_agent, slow=10),
     Kind("episode", Episode.load, use_episode),
     Kind("results", load_results, use_results, main="results.json", slow=8),
     Kind("run", read_run, use_plan, main="run.json", slow=8),

@@ -174,23 +174,6 @@ def policies(folder: Path) -> None:
         policy.save(folder / "policy" / name / "agent.json")
 
 
-def sb3(folder: Path) -> None:
-    """An agent as stable-baselines3 saves it."""
-    from stable_baselines3 import PPO
-
-    folder.joinpath("sb3").mkdir()
-    ships = shipgym.ShipVecEnv("shipgym/CourseKeeping-v0", 2, model="mariner", seed=0)
-    agent = PPO(
-        "MlpPolicy",
-        ships,
-        n_steps=8,
-        batch_size=8,
-        seed=0,
-        policy_kwargs={"net_arch": [4]},
-    )
-    agent.learn(16).save(folder / "sb3" / "ppo.zip")
-
-
 def episode(folder: Path) -> None:
     """A few steps along a path."""
     n = 6
@@ -276,7 +259,6 @@ MAKERS: tuple[Callable[[Path], None], ...] = (
     models,
     controllers,
     policies,
-    sb3,
     episode,
     results,
     run,

@@ -1,12 +1,9 @@
-"""One change to a file, by its format: JSON, TOML, CSV, safetensors, zip, bytes."""
+"""One change to a file, by its format: JSON, TOML, CSV, safetensors, bytes."""
 
 from __future__ import annotations
 
-import io
 import json
 import struct
-import warnings
-import zipfile
 from collections.abc import Callable
 from random import Random
 from typing import Any
@@ -228,33 +225,9 @@ def safetensors_changed(random: Random, content: bytes) -> bytes:
     return struct.pack("<Q", len(text)) + text + data
 
 
-def zip_changed(random: Random, content: bytes) -> bytes:
-    """A member changed, dropped, renamed or compressed."""
-    with zipfile.ZipFile(io.BytesIO(content)) as file:
-        members = [(one.filename, file.read(one)) for one in file.infolist()]
-    k = random.randrange(len(members))
-    name, inner = members[k]
-    change = json_changed if inner[:1] == b"{" else spoilt
-    change = zip_changed if inner[:2] == b"PK" else change
-    renamed = random.choice(members)[0] + random.choice(("", "x", "/"))
-    members[k : k + 1] = random.choice(
-        ([], [(renamed, inner)], *([(name, change(random, inner))],) * 8)
-    )
-    kind = random.choice((zipfile.ZIP_STORED,) * 9 + (zipfile.ZIP_DEFLATED,))
-    sink = io.BytesIO()
-    with (
-        warnings.catch_warnings(action="ignore"),
-        zipfile.ZipFile(sink, "w", kind) as file,
-    ):
-        for one, bytes_ in members:  # names may come twice
-            file.writestr(one, bytes_)
-    return sink.getvalue()
-
-
 CHANGES: dict[str, Callable[[Random, bytes], bytes]] = {
     "json": json_changed,
     "toml": toml_changed,
     "csv": csv_changed,
     "safetensors": safetensors_changed,
-    "zip": zip_changed,
 }

@@ -278,7 +278,7 @@ def test_controllers_are_given_as_texts_functions_objects_and_by_name():
         ([lazy, "pid"], [("Broken", lazy), ("pid", "pid")]),
         ({"both": [pid, make]}, [("both", [pid, make])]),
         (pattern, [("pid", pattern)]),
-        ("{task}.zip", [("agent", "{task}.zip")]),
+        ("{task}.json", [("agent", "{task}.json")]),
     ):
         found = [(entry.name, entry.source) for entry in read_entries(given)]
         assert found == expected
