@@ -7,9 +7,9 @@
 Judged on 100 episodes that none of them has seen. A search (CMA-ES) has episodes of
 its own and so many seconds of processor; it begins with the numbers of
 `examples/berth_rule.py` or `encounter_rule.py` and prints what it finds. The agent is
-stable-baselines3's PPO as in `learn_examples.py` and `encounter_curve.py`. The row
+stable-baselines3's PPO with its defaults. The row
 "lowest" has the lowest cost in each episode of the rule with 40 draws of its numbers:
-a bound from clairvoyance, since nobody knows beforehand which are best.
+it is no rule, since nobody knows beforehand which are best.
 """
 
 import argparse

