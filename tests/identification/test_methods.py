@@ -16,7 +16,6 @@ from identification import (
     TunedLSSVM,
     identify,
 )
-from identification.estimators.l_curve import LCurve, corner_rank, gcv_rank
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 
@@ -169,19 +168,3 @@ def test_an_estimator_object_is_a_method(
         assert own.standard_errors[name] == pytest.approx(error, rel=1e-3), name
     assert own.settings["method"]["name"] == "Ridge"
     assert (own.model.provenance or {})["method"] == "Ridge"
-
-
-def test_the_rank_of_few_samples_is_the_corner_and_of_many_what_they_determine() -> (
-    None
-):
-    """The corner has the smallest product of norms, unless a rank fits better."""
-    curve = LCurve(np.array([10.0, 1.0, 0.8, 0.79]), np.array([1.0, 2.0, 9.0, 90.0]))
-    assert [corner_rank(curve, n) for n in (4, 5, 100, 400)] == [2, 2, 3, 4]
-    flat = LCurve(np.array([10.0, 1.0, 1.0, 1.0]), np.array([1.0, 2.0, 9.0, 90.0]))
-    assert corner_rank(flat, 400) == 2
-    exact = LCurve(np.array([1.0, 1e-3, 1e-14]), np.ones(3))
-    assert corner_rank(exact, 100) == 3
-    # (residual / (n - rank))^2: 10 / 9, 1 / 8, 0.8 / 7 and 0.79 / 6 of ten samples
-    assert gcv_rank(curve, 10) == 3
-    assert gcv_rank(curve, 6) == 2  # 1 / 4 against 0.8 / 3
-    assert gcv_rank(curve, 4) == 2  # never as many as samples

@@ -11,7 +11,7 @@ from identification.estimators.rm_svm import RMSVM
 from identification.judging.closed_loop import closed_loop
 from identification.judging.warnings import held_out_error
 from identification.samples.prediction import predict
-from shipgym import ShipModel, Trial, load_model
+from shipgym import ShipModel, Trial
 from shipgym.manoeuvres import zigzag, zigzag_indices
 from shipgym.models.simulate import simulate
 
@@ -105,13 +105,6 @@ def test_a_correction_left_out_has_an_uncertainty_and_is_said() -> None:
     bare = RMSVM(C=0.0).fit(samples.features["r"], samples.targets["r"])
     assert not bare.coef_.any()
     assert np.all(np.diag(bare.inverse_moment_) > 0.0)
-
-
-def test_a_ship_whose_roll_is_not_recorded_sails_no_zigzag_in_closed_loop(
-    mariner: ShipModel,
-) -> None:
-    run = zigzag(mariner, 10, 10, duration=300, dt=1.0)
-    assert closed_loop(load_model("container"), run) is None
 
 
 def test_a_log_with_positions_tells_of_yaw_what_the_log_without_tells(

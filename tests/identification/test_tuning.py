@@ -16,7 +16,6 @@ from identification import (
 from identification.estimators.objectives import (
     held_out_error,
     time_blocks,
-    training_error,
 )
 from identification.estimators.search import Optimiser
 from shipgym import InputError
@@ -92,17 +91,6 @@ def test_held_out_error_is_that_of_fits_one_by_one(
                     estimator.coef_, oracle.fit(X[~away], y[~away]).coef_, rtol=1e-7
                 )
         assert error(np.log10([[C]]))[0] == pytest.approx(np.mean(squares), rel=1e-9)
-
-
-def test_training_error_falls_with_the_weight_up_to_the_upper_bound() -> None:
-    X, y = regression(noise=0.01)
-    error = training_error(X, y, True, True)(np.linspace(-2.0, 4.0, 40)[:, None])
-    assert np.all(np.diff(error) < 0.0)
-    for optimiser in ("abc", "pso", "grid"):
-        estimator = TunedLSSVM(
-            optimiser=optimiser, objective="training", bounds=(1e-2, 1e4)
-        ).fit(X, y)
-        assert pytest.approx(1e4, rel=0.1) == estimator.C_
 
 
 def test_held_out_optimum_is_inside_and_predicts_better_where_data_are_few() -> None:
