@@ -16,11 +16,17 @@ from real_ships.mmg import CIRCLES, HSVA, OTHERS, circle, fitted
 from identification import PriorKnowledge
 from shipgym import InputError
 
+SHIPS = Path(__file__).parents[1] / "ships"
 MEASURED_RUNS = Path(__file__).parents[2].parent / "shared" / "data"
 
 measured = pytest.mark.skipif(
     not MEASURED_RUNS.is_dir(), reason=f"the measured runs are not at {MEASURED_RUNS}"
 )
+
+
+@pytest.fixture
+def data() -> Data:
+    return Data(SHIPS, MEASURED_RUNS)
 
 
 @measured
