@@ -13,8 +13,6 @@ from .controllers.pid import PID as PID
 from .controllers.preview_lq import PreviewLQ as PreviewLQ
 from .controllers.registry import controller_kinds as controller_kinds
 from .controllers.registry import register_controller as register_controller
-from .controllers.robustness import MarginUncertainty as MarginUncertainty
-from .controllers.robustness import margin_uncertainty as margin_uncertainty
 from .controllers.wheel_over import WheelOver as WheelOver
 from .policies.policy import LearnedPolicy as LearnedPolicy
 from .rollouts.course_keeping import Episodes as Episodes

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, LQG, load_agent, sail
-from agents.controllers.kalman import kalman_gain, rudder_response, wave_model
+from agents.controllers.kalman import kalman_gain, rudder_response
 from agents.controllers.linear_loop import sample_ship
 from shipgym.errors import InputError
 from shipgym.models.linear import straight_running
@@ -50,22 +50,6 @@ def test_poles_of_the_loop_are_those_of_lq_and_of_the_filter(model):
         assert np.abs(poles - pole).min() < 0.02
     assert lqg.margins.gain_margin > 3.0
     assert lqg.margins.phase_margin_deg > 35.0
-
-
-def test_the_wave_model_keeps_its_deviation_and_period():
-    transition, drive = wave_model(9.0, 0.02, 1.0)
-    covariance = np.zeros((2, 2))
-    for _ in range(2000):
-        covariance = transition @ covariance @ transition.T + drive
-    assert np.sqrt(covariance[0, 0]) == pytest.approx(0.02, rel=1e-6)
-    pole = np.linalg.eigvals(transition)[0]
-    assert 2.0 * np.pi / np.abs(np.log(pole)) == pytest.approx(9.0, rel=1e-6)
-    swing = 9.0 / np.sqrt(
-        1.0 - 0.1**2
-    )  # of which each has exp(-2 pi 0.1 / sqrt(0.99)) of the one before
-    assert wave_model(9.0, 0.02, swing)[0] == pytest.approx(
-        0.5318 * np.eye(2), abs=1e-4
-    )
 
 
 def gain_at(controller, period):

@@ -5,11 +5,10 @@ import pytest
 
 from agents import LQ, LQG, PID
 from agents.controllers.linear_loop import SIGNALS, sample_ship
-from agents.controllers.margins import (
-    largest_pole,
-)
+from agents.controllers.margins import largest_pole
+from shipgym.errors import InputError
 from shipgym.tasks.scales import control_interval
-from tests.agents.mariners import LAGGING, MARINER
+from tests.agents.mariners import LAGGING, MARINER, changed
 
 RUDDER = np.array(SIGNALS) == "rudder"
 
@@ -61,3 +60,20 @@ def test_the_loop_of_a_law_is_what_its_margins_are_of(kind):
     controller = kind.from_model(MARINER)
     ship = sample_ship(MARINER, controller.design["dt"])
     assert controller.loop().margins(ship, "it") == controller.margins
+
+
+RUDDER_COEFFICIENTS = ("Y_d", "Y_ud", "Y_uud", "N_d", "N_ud", "N_uud")
+
+
+@pytest.mark.parametrize("kind", [PID, LQ, LQG])
+def test_the_gain_margin_is_the_rudder_effect_at_which_the_loop_becomes_unstable(kind):
+    controller = kind.from_model(MARINER)
+    margin = controller.margins.gain_margin
+
+    def ship(factor):
+        return changed(**dict.fromkeys(RUDDER_COEFFICIENTS, factor))
+
+    near = controller.margins_on(ship(0.9 * margin))
+    assert near.gain_margin == pytest.approx(1.0 / 0.9, rel=0.05)
+    with pytest.raises(InputError):
+        controller.margins_on(ship(1.1 * margin))

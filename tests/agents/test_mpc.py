@@ -1,4 +1,4 @@
-"""MPC: the path ahead as it sees it, symmetry, what the search is worth, its file."""
+"""MPC: symmetry, what the search is worth, its file."""
 
 import json
 
@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from agents import MPC, WheelOver, check_controller, load_agent
-from agents.controllers.law import Turns
-from agents.controllers.path_ahead import FAR, PathAhead
 from agents.rollouts.rollout import episode_costs
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
@@ -15,33 +13,6 @@ from shipgym.models import load_model
 from shipgym.sea import Current, Weather
 from shipgym.tasks.task import path_following_task
 from tests.agents.mariners import MARINER
-
-
-def turns(*numbers):
-    """Two turns of one ship."""
-    return Turns(*(np.array([one]) for one in numbers))
-
-
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_ship_on_the_arc_is_on_the_path_and_beyond_it_on_the_next_leg(side):
-    turn, radius, begin = side * np.radians(60.0), 300.0, 100.0
-    ahead = PathAhead(turns(begin, turn, 900.0, -turn), radius)
-    for swept in np.radians([10.0, 45.0]):
-        x, y = begin + radius * np.sin(swept), side * radius * (1.0 - np.cos(swept))
-        place = ahead.fix(np.array([x]), np.array([y]))
-        assert place.along_track[0] == pytest.approx(begin + radius * swept)
-        assert place.cross_track[0] == pytest.approx(0.0, abs=1e-9)
-        assert place.course[0] == pytest.approx(side * swept)
-        assert place.turns.next_angle[0] == pytest.approx(turn - side * swept)
-
-    further, aside = 50.0, 7.0  # on the next leg, and to starboard of it
-    end = begin + radius * np.sin(abs(turn)), side * radius * (1.0 - np.cos(turn))
-    x = end[0] + further * np.cos(turn) - aside * np.sin(turn)
-    y = end[1] + further * np.sin(turn) + aside * np.cos(turn)
-    place = ahead.fix(np.array([x]), np.array([y]))
-    along = begin + radius * abs(turn) + further
-    assert (place.along_track[0], place.cross_track[0]) == pytest.approx((along, aside))
-    assert place.turns.next_distance[0] == FAR
 
 
 def mirrored(observation):

@@ -22,30 +22,6 @@ FREE = {"base": "none", "authority": 1.0}
 
 
 @pytest.mark.parametrize(
-    ("algorithm", "name", "allowed", "beyond"),
-    [
-        ("ppo", "total_steps", 1, 0),
-        ("ppo", "learning_rate", 1.0, 1.1),
-        ("ppo", "gamma", 0.0, -0.01),
-        ("ppo", "reward_scale", 1e-9, 0.0),
-        ("ppo", "net_arch", [1], [0]),
-        ("ppo", "batch_size", 2, 1),
-        ("ppo", "log_std_end", 3.0, 3.1),
-        ("sac", "target_entropy", 1.0, 1.1),
-        ("td3", "action_noise", 1e-9, 0.0),
-        ("tqc", "top_quantiles_to_drop", 24, 25),
-    ],
-)
-def test_settings_reach_to_their_bounds_and_no_further(
-    algorithm, name, allowed, beyond
-):
-    kept = load_settings(algorithm, given={name: allowed}).to_dict()
-    assert kept[name] == allowed
-    with pytest.raises(InputError, match=rf"{name}: .*expected|top_quantiles_to_drop"):
-        load_settings(algorithm, given={name: beyond})
-
-
-@pytest.mark.parametrize(
     ("given", "message"),
     [
         ({"net_arch": "64"}, r"net_arch: expected widths .* such as \[64, 64\]"),

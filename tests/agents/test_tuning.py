@@ -8,7 +8,6 @@ import pytest
 from typer.testing import CliRunner
 
 from agents.cli import app
-from agents.cli.training import print_tuning
 from agents.training import tuning
 from agents.training.plan import TrainingRequest, make_plan
 from agents.training.settings import (
@@ -18,10 +17,7 @@ from agents.training.settings import (
     with_parameters,
 )
 from agents.training.tuning import (
-    TuningResult,
-    TuningTrial,
     lowest,
-    median_costs,
     train_trial,
     tune,
 )
@@ -129,17 +125,6 @@ def test_whatever_is_proposed_are_valid_settings(algorithm):
         assert found.rollout % found.batch_size == 0 or algorithm != "ppo"
 
 
-def test_a_trial_must_keep_up_with_the_median_of_finished_ones():
-    curves = [((100, 9.0 - k), (200, 8.0 - k), (300, 8.5 - k)) for k in range(4)]
-    assert median_costs(curves[:3], 400) == []
-    found = median_costs(curves, 400)
-    assert found == [(100, 7.5), (200, 6.5), (300, 6.5)]
-    assert (
-        median_costs(curves, 800) == found[1:]
-    )  # in the first quarter none is stopped
-    assert (lowest(found, 50), lowest(found, 250)) == (math.inf, 6.5)
-
-
 def test_trials_are_trainings_that_stop_when_they_fall_behind():
     small = {
         "total_steps": 256,
@@ -174,24 +159,6 @@ def test_folder_of_something_else_is_refused(trainings, tmp_path, monkeypatch):
     monkeypatch.setattr(tuning, "run_jobs", lambda _, jobs, *more: map(diverges, jobs))
     with pytest.raises(InputError, match=r"every trial diverged, the last: .* 0\.99$"):
         tune(plan(), tmp_path / "other", 5)
-
-
-def test_trials_are_told_the_best_first(tmp_path, capsys):
-    varied = {"learning_rate": 0.00123456, "n_epochs": 7, "activation": "tanh"}
-    trials = (
-        TuningTrial(0, {}, 9.87654, "finished"),
-        TuningTrial(1, varied, None, "stopped early"),
-        TuningTrial(2, varied, 5.4321, "finished"),
-    )
-    print_tuning(TuningResult(trials, trials[2]), tmp_path)
-    rows = [line.split(maxsplit=2) for line in capsys.readouterr().out.splitlines()]
-    assert [row[:2] for row in rows[2:5]] == [
-        ["2", "5.432"],
-        ["0", "9.877"],
-        ["1", "-"],
-    ]
-    assert "learning_rate 0.00123, n_epochs 7, activation tanh" in rows[2][2]
-    assert "nothing: as it was" in rows[3][2]
 
 
 def test_the_command_tunes_and_goes_on_with_a_study(tmp_path):
