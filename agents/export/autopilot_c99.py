@@ -24,7 +24,6 @@ from agents.export.autopilot import (
 )
 from agents.export.c_expression import Translated
 from agents.export.c_structures import (
-    Parameter,
     kind_of,
     leaf_paths,
     numbers_of,
@@ -72,21 +71,7 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
         ship=False,
         title=title,
         sha256=data["sha256"],
-        parameters=tunable(c, agent, p),
     )
-
-
-def tunable(c: Translator, agent: Any, p: BridgeParameters) -> tuple[Parameter, ...]:
-    """Parameters that may be set; the control interval is part of the design."""
-    without = {"dt"}
-    if not isinstance(getattr(agent, "base", None), Guided):
-        without |= {"task_lookahead", "path_radius"}  # of the environment of a policy
-    kept = []
-    for parameter in c.structures.parameters(kind_of(p), numbers_of(p)):
-        is_interval = parameter.path.endswith(".dt")
-        if not is_interval and parameter.path not in without:
-            kept.append(parameter)
-    return tuple(kept)
 
 
 def controller_data(c: Translator, agent: Any, p: BridgeParameters) -> dict[str, Any]:

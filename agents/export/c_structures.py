@@ -49,15 +49,7 @@ class Structures:
     taken: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        public = [
-            "init",
-            "step",
-            "step_with",
-            "defaults",
-            "state",
-            "input",
-            "parameters",
-        ]
+        public = ("init", "step", "state", "input", "parameters")
         self.taken |= {f"{self.prefix}_{ending}" for ending in public}
 
     def type(self, kind: Kind) -> str:
@@ -142,30 +134,6 @@ class Structures:
             number += 1
         self.taken.add(free)
         return free
-
-    def parameters(
-        self, kind: Kind, numbers: Iterator[float], before: str = ""
-    ) -> list["Parameter"]:
-        """Numbers of a constant that may be set; those of tables are left out."""
-        found = []
-        for member, part in members(kind).items():
-            label = self.constant_label(kind, member)
-            path = f"{before}{label.name}"
-            if is_table(part):
-                _ = list(islice(numbers, part.rows))
-            elif part in NUMBERS:
-                found.append(Parameter(path, next(numbers), label.note))
-            else:
-                found += self.parameters(part, numbers, f"{path}.")
-        return found
-
-
-class Parameter(NamedTuple):
-    """A number of a constant that may be set."""
-
-    path: str  # where it is in the structure, such as `law.gains.sway`
-    value: float
-    note: str
 
 
 @cache

@@ -33,7 +33,6 @@ class FmuVariable(NamedTuple):
     name: str
     reference: int
     causality: str
-    variability: str
     start: float
     unit: str
     description: str
@@ -76,7 +75,7 @@ def check_fmu_name(path: Path) -> None:
 
 
 def fmu_variables(source: Source) -> list[FmuVariable]:
-    """Inputs, outputs and parameters of an exported ship or autopilot, in order."""
+    """Inputs and outputs of an exported ship or autopilot, in order."""
     found: list[FmuVariable] = []
     for causality, variables in (("input", source.inputs), ("output", source.outputs)):
         for name, about in variables.items():
@@ -85,24 +84,11 @@ def fmu_variables(source: Source) -> list[FmuVariable]:
                     name=name,
                     reference=len(found) + 1,
                     causality=causality,
-                    variability="continuous",
                     start=about.start,
                     unit=about.unit,
                     description=about.meaning,
                 )
             )
-    for parameter in source.parameters:
-        found.append(
-            FmuVariable(
-                name=parameter.path,
-                reference=len(found) + 1,
-                causality="parameter",
-                variability="tunable",
-                start=parameter.value,
-                unit="",
-                description=parameter.note,
-            )
-        )
     return found
 
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from agents.controllers.interface import model_hash
-from agents.export.c_structures import Label, Parameter, leaf_paths, record_kind
+from agents.export.c_structures import Label, leaf_paths, record_kind
 from agents.export.c_syntax import comment
 from agents.export.source import (
     Source,
@@ -159,28 +159,8 @@ def ship_source(
         ship=True,
         title=title,
         sha256=model_hash(model),
-        parameters=_tunable(c, model, kind, numbers),
         notes=(note,) if note else (),
     )
-
-
-def _tunable(
-    c: Translator, model: ShipModel, kind: Any, numbers: Sequence[float]
-) -> tuple[Parameter, ...]:
-    """Parameters of her steering gear and her coefficients."""
-    gear = {"ship.rudder_limit", "ship.rudder_rate"}
-    if model.compiled.lag:
-        gear.add("ship.gear_frequency")
-
-    kept = []
-    for parameter in c.structures.parameters(kind, iter(numbers)):
-        path = parameter.path
-        of_hull = path.startswith("coefficients.")
-        has_effect = of_hull or path in gear
-        # XML has no word for an infinite number
-        if has_effect and np.isfinite(parameter.value):
-            kept.append(parameter)
-    return tuple(kept)
 
 
 def _translated(

@@ -10,7 +10,6 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 import shipgym
-from agents.export.c_structures import Parameter
 from agents.export.c_syntax import KEYWORDS, comment, literal
 from shipgym import InputError
 
@@ -45,8 +44,6 @@ class Source:
         What was exported, in the user's own letters.
     sha256 : str
         Hash of the model's numbers.
-    parameters : tuple of Parameter
-        Numbers that may be set while it runs.
     notes : tuple of str
         What was left out, and why.
     """
@@ -60,7 +57,6 @@ class Source:
     ship: bool
     title: str
     sha256: str
-    parameters: tuple[Parameter, ...] = ()
     notes: tuple[str, ...] = ()
 
 
