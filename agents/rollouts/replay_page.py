@@ -1,8 +1,8 @@
 """The replay page: recorded episodes in one HTML file that works offline."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from shipgym import Episode, InputError
 from shipgym.arrays import Floats
 from shipgym.files import write_text
 from shipgym.pages import render
+from shipgym.plots import Panel, axis, line, panels, points
+from shipgym.plots.style import MUTED, PALETTE, Figure
 from shipgym.tasks.guidance import wrapped
 
 COURSE_ORDERS = (
@@ -23,41 +25,37 @@ COURSE_ORDERS = (
 
 
 class ReplayQuantity(NamedTuple):
-    """A quantity that the page may show over time and as a read-out."""
+    """A quantity that the page may show over time."""
 
     label: str
-    unit: str
-    decimals: int
     line: str  # series that is drawn
-    order: str | None = None  # series of its order, drawn dashed
-    short: str | None = None  # short name
+    order: str = ""  # series of its order, drawn dashed
 
 
 #: In the order of the page; a quantity that no episode has is left out.
 QUANTITIES = (
-    ReplayQuantity("heading", "deg", 1, "psi", order="course_order"),
-    ReplayQuantity(
-        "cross-track error", "m", 1, "cross_track_error", short="cross-track"
-    ),
-    ReplayQuantity("heading error", "deg", 1, "heading_error"),
-    ReplayQuantity("rudder", "deg", 1, "delta", order="rudder_order"),
-    ReplayQuantity("speed through water", "m/s", 2, "speed", short="speed"),
-    ReplayQuantity("yaw rate", "deg/s", 2, "yaw_rate"),
-    ReplayQuantity("heel", "deg", 1, "heel"),
-    ReplayQuantity("shaft speed", "1/min", 1, "shaft_speed"),
-    ReplayQuantity("wind speed", "m/s", 1, "wind_speed", short="wind"),
-    ReplayQuantity("wind from", "deg", 0, "wind_from"),
-    ReplayQuantity("current speed", "m/s", 2, "current_speed", short="current"),
-    ReplayQuantity("current towards", "deg", 0, "current_towards", short="setting"),
-    ReplayQuantity("reward so far", "", 2, "reward_so_far"),
+    ReplayQuantity("heading, deg", "psi", order="course_order"),
+    ReplayQuantity("cross-track error, m", "cross_track_error"),
+    ReplayQuantity("heading error, deg", "heading_error"),
+    ReplayQuantity("rudder, deg", "delta", order="rudder_order"),
+    ReplayQuantity("speed through water, m/s", "speed"),
+    ReplayQuantity("yaw rate, deg/s", "yaw_rate"),
+    ReplayQuantity("heel, deg", "heel"),
+    ReplayQuantity("shaft speed, 1/min", "shaft_speed"),
+    ReplayQuantity("wind speed, m/s", "wind_speed"),
+    ReplayQuantity("wind from, deg", "wind_from"),
+    ReplayQuantity("current speed, m/s", "current_speed"),
+    ReplayQuantity("current towards, deg", "current_towards"),
+    ReplayQuantity("reward so far", "reward_so_far"),
 )
+FRAMES = 200  # places of the slider
 
 
 def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
     """Write the replay page of recorded episodes.
 
-    Raises InputError if there is no episode, one cannot be read, or the page cannot be
-    written; nothing is written then.
+    Raises InputError if there is no episode, one cannot be read, the page cannot be
+    written, or plotly is not installed; nothing is written then.
 
     Parameters
     ----------
@@ -67,19 +65,18 @@ def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
         The HTML file; one that exists is replaced.
     """
     target = Path(out)
-    check_page(target)
+    check_page(target, plots=True)
     if not paths:
         raise InputError("episodes: expected at least one, got none")
     files = [Path(path) for path in paths]
     episodes = [Episode.load(path) for path in files]
-    runs = []
-    for title, episode in zip(_titles(files), episodes, strict=True):
-        runs.append(_run(title, episode))
-    models = dict.fromkeys(episode.model for episode in episodes)
+    runs = dict(zip(_titles(files), episodes, strict=True))
     page = render(
         "agents.rollouts/replay.html",
-        title=f"Replay: {', '.join(models)}",
-        data={"runs": runs, "quantities": _quantities(runs)},
+        runs=runs,
+        outcome=_outcome,
+        chart=_chart(runs),
+        histories=_histories(runs),
     )
     write_text(page, target)
 
@@ -94,43 +91,112 @@ def _titles(paths: Sequence[Path]) -> list[str]:
     return ["/".join(stem[-depth:]) for stem in stems]
 
 
-def _quantities(runs: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Quantities that some of the runs have."""
-    recorded = {name for run in runs for name in run["series"]}
-    shown = [quantity for quantity in QUANTITIES if quantity.line in recorded]
-    return [quantity._asdict() for quantity in shown]
+def _chart(runs: Mapping[str, Episode]) -> Figure:
+    """Tracks and paths from above, with a frame for each place of the slider."""
+    paths = {}  # runs often share theirs
+    tracks = []
+    for number, (name, episode) in enumerate(runs.items()):
+        states = episode.states
+        if episode.path is not None:
+            paths[episode.path.tobytes()] = episode
+        track = line(states["y"], states["x"], name, _colour(number), 1.2)
+        tracks.append(track)
+
+    traces = []
+    for episode in paths.values():
+        north, east = np.asarray(episode.path).T
+        traces.append(line(east, north, "path", MUTED, 1.2, line_dash="dash"))
+        if episode.waypoints is not None:
+            north, east = np.asarray(episode.waypoints).T
+            traces.append(points(east, north, "waypoints", MUTED))
+    traces += tracks
+
+    first_ship = len(traces)
+    for number, (name, episode) in enumerate(runs.items()):
+        hull = _hull(episode, 0.0)
+        bow = {"size": [8, 0, 0, 0, 0, 0]}  # where the ship is too small to be seen
+        colour = _colour(number)
+        ship = line(**hull, name=name, colour=colour, mode="lines+markers", marker=bow)
+        traces.append(ship.update(fill="toself", showlegend=False))
+
+    north_axis = axis("north, m", scaleanchor="x", scaleratio=1)
+    figure = panels([Panel(traces, "east, m", north_axis)], 620, hovermode="closest")
+    end = max(episode.n_steps * episode.dt for episode in runs.values())
+    times = np.linspace(0.0, end, FRAMES)
+    ships = list(range(first_ship, len(traces)))
+    frames = []
+    for time in times.tolist():
+        hulls = [_hull(episode, time) for episode in runs.values()]
+        frames.append({"name": f"{time:.1f}", "data": hulls, "traces": ships})
+    figure.frames = frames
+    return _with_slider(figure, [frame["name"] for frame in frames])
 
 
-def _run(name: str, episode: Episode) -> dict[str, Any]:
-    """An episode ready for the page's JSON: what it is, and series of n + 1 values."""
-    slender = episode.length / 6.5  # a beam that is not known
-    parts = {}
-    for part, values in episode.reward_parts.items():
-        parts[part] = _rounded(np.append(0.0, values))
-    series = {}
-    for quantity, values in _series(episode).items():
-        series[quantity] = _rounded(values)
-    path, waypoints = episode.path, episode.waypoints
-    return {
-        "name": name,
-        "environment": episode.environment,
-        "model": episode.model,
-        "number": episode.number,
-        # a string: too long for a number in a browser
-        "seed": None if episode.seed is None else str(episode.seed),
-        "dt": episode.dt,
-        "steps": episode.n_steps,
-        "length": episode.length,
-        "beam": episode.beam or slender,
-        "outcome": _outcome(episode),
-        "total": float(np.sum(episode.rewards)),
-        "corridor": episode.corridor,
-        "waypoints": None if waypoints is None else _rounded(waypoints),
-        "path": None if path is None else _rounded(path),
-        "series": series,
-        "parts": parts,
-        "rewards": _rounded(np.append(0.0, episode.rewards)),
+def _with_slider(figure: Figure, times: Sequence[str]) -> Figure:
+    """A figure with a slider over its frames, and buttons to play and to pause."""
+    at_once = {"mode": "immediate", "transition": {"duration": 0}}
+    still = {**at_once, "frame": {"duration": 0, "redraw": False}}
+    playing = {
+        **at_once,
+        "frame": {"duration": 50, "redraw": False},
+        "fromcurrent": True,
     }
+    steps = []
+    for time in times:
+        steps.append({"label": time, "method": "animate", "args": [[time], still]})
+    play = {"label": "Play", "method": "animate", "args": [None, playing]}
+    pause = {"label": "Pause", "method": "animate", "args": [[None], still]}
+    buttons = {"type": "buttons", "direction": "left", "buttons": [play, pause]}
+    slider = {"steps": steps, "currentvalue": {"prefix": "time, s: "}, "x": 0.15}
+    figure.update_layout(
+        sliders=[{**slider, "len": 0.85, "pad": {"t": 45}}],
+        updatemenus=[{**buttons, "x": 0.1, "y": -0.12, "showactive": False}],
+        margin_b=130,
+    )
+    return figure
+
+
+def _hull(episode: Episode, time: float) -> dict[str, list[float]]:
+    """Outline of a ship at a time, x east and y north; at its end it stays."""
+    t = episode.dt * np.arange(episode.n_steps + 1)
+    states = episode.states
+    heading = np.interp(time, t, np.unwrap(states["psi"]))
+    shape = [(0.5, 0.0), (0.2, 0.5), (-0.5, 0.4), (-0.5, -0.4), (0.2, -0.5), (0.5, 0.0)]
+    slender = episode.length / 6.5  # a beam that is not known
+    outline = np.array(shape) * [episode.length, episode.beam or slender]
+    ahead, aside = outline.T
+    sine, cosine = np.sin(heading), np.cos(heading)
+    north = np.interp(time, t, states["x"]) + ahead * cosine - aside * sine
+    east = np.interp(time, t, states["y"]) + ahead * sine + aside * cosine
+    return {"x": np.round(east, 2).tolist(), "y": np.round(north, 2).tolist()}
+
+
+def _histories(runs: Mapping[str, Episode]) -> Figure:
+    """Quantities over time, a panel each: the runs, and their orders dashed."""
+    series = {name: _series(episode) for name, episode in runs.items()}
+    recorded = {quantity for found in series.values() for quantity in found}
+    shown = [quantity for quantity in QUANTITIES if quantity.line in recorded]
+    parts = sorted({part for episode in runs.values() for part in episode.reward_parts})
+    for part in parts:
+        words = part.removeprefix("reward_").replace("_", " ")
+        shown.append(ReplayQuantity(f"{words}, reward so far", part))
+
+    drawn = []
+    for quantity in shown:
+        traces = []
+        for number, (name, episode) in enumerate(runs.items()):
+            t = episode.dt * np.arange(episode.n_steps + 1)
+            for label, dash in ((quantity.line, "solid"), (quantity.order, "dot")):
+                if label in series[name]:
+                    values = series[name][label]
+                    colour = _colour(number)
+                    traces.append(line(t, values, name, colour, 1.4, line_dash=dash))
+        drawn.append(Panel(traces, "time, s", "", quantity.label))
+    return panels(drawn, 190 * ((len(drawn) + 1) // 2) + 80, 2, outer=True)
+
+
+def _colour(number: int) -> str:
+    return PALETTE[number % len(PALETTE)]
 
 
 def _series(episode: Episode) -> dict[str, Floats]:
@@ -142,6 +208,8 @@ def _series(episode: Episode) -> dict[str, Floats]:
         "y": states["y"],
         "reward_so_far": np.append(0.0, np.cumsum(episode.rewards)),
     }
+    for part, values in episode.reward_parts.items():
+        found[part] = np.append(0.0, np.cumsum(values))
     if "u" in states:
         found["speed"] = np.hypot(states["u"], states.get("v", 0.0))
     for name in ("cross_track_error", "cross_track"):
@@ -214,10 +282,3 @@ def _outcome(episode: Episode) -> str:
         return "terminated"
     ended = "time limit" if episode.truncated else "cut off"
     return ended if episode.success is None else f"{ended}, no success"
-
-
-def _rounded(values: Floats) -> list[Any]:
-    """Numbers with seven significant digits: a millimetre in a kilometre."""
-    if values.ndim > 1:
-        return [_rounded(row) for row in values]
-    return [float(f"{value:.7g}") for value in values.tolist()]

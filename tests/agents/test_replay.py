@@ -1,5 +1,6 @@
 import json
 import re
+from base64 import b64decode
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from typer.testing import CliRunner
 from agents.cli import app
 from agents.rollouts import write_replay
 from shipgym import Episode, InputError
+from tests.agents.browser import COMMAND, Browser
 
 STEPS, DT = 40, 5.0
 END = STEPS * DT
@@ -59,80 +61,83 @@ def episode(**changes):
     return Episode(**(known | changes))
 
 
-def data_of(page):
-    """What the page holds for its script."""
-    return json.loads(
-        re.search(
-            r'<script type="application/json"[^>]*>(.*?)</script>', page, re.DOTALL
-        )[1]
-    )
+def plots_of(page):
+    """Data of the figures that the page draws, by their names."""
+    read = json.JSONDecoder().raw_decode
+    found = {}
+    for start in re.finditer(r'Plotly.newPlot\("plot-(\w+)-figure",', page):
+        found[start[1]], _ = read(page, start.end())
+    return found
+
+
+def values(numbers):
+    """Numbers of a figure, which plotly writes as bytes in base64."""
+    if isinstance(numbers, dict):
+        return np.frombuffer(b64decode(numbers["bdata"]), numbers["dtype"])
+    return np.array(numbers)
 
 
 @pytest.fixture
 def shown(tmp_path):
-    """What the page of an episode holds for its script."""
+    """The page of an episode."""
 
     def written(**changes):
         episode(**changes).save(tmp_path / "one.json")
         write_replay([tmp_path / "one.json"], tmp_path / "replay.html")
-        return data_of((tmp_path / "replay.html").read_text())
+        return (tmp_path / "replay.html").read_text()
 
     return written
 
 
-def test_a_page_holds_what_is_shown_of_an_episode_in_the_units_that_are_read(shown):
+def histories(page):
+    """First and last value of each line of the histories, by panel, in its order."""
+    panels = re.findall(r'"text":"([^"]+)","x":', page)
+    found = {panel: [] for panel in panels}
+    for trace in plots_of(page)["histories"]:
+        panel = panels[int(trace["yaxis"][1:] or 1) - 1]
+        y = values(trace["y"])
+        found[panel].append((y[0], y[-1]))
+    return found
+
+
+def test_a_page_shows_what_was_recorded_in_the_units_that_are_read(shown):
     n = np.linspace(1.0, 1.5, STEPS + 1)
     states = {**episode().states, "phi": episode().states["psi"], "n": n}
-    data = shown(states=states, beam=None)
-    (run,) = data["runs"]
-    assert run["seed"] == str(2**80)  # a number would lose its end in a browser
-    assert run["waypoints"] == [[0.0, 0.0], [1000.0, 0.0]]
-    assert run["total"] == -0.5 * STEPS
-    assert run["length"] / run["beam"] == pytest.approx(6.5)  # as slender as ships are
-    assert (run["corridor"], run["dt"], run["outcome"]) == (50.0, DT, "time limit")
-    assert run["rewards"][:2] == [0.0, -0.5]
-    assert run["parts"]["reward_rudder"][:2] == [0.0, -0.1]
-    series = run["series"]
+    page = shown(states=states, beam=None)
+    found = {panel: lines[0] for panel, lines in histories(page).items()}
+    turned = np.degrees(0.002 * END)
     expected = {
-        "speed": 5.0,
-        "cross_track_error": 20.0,
-        "yaw_rate": np.degrees(0.002),
-        "heading_error": np.degrees(0.1),
-        "course_order": np.degrees(0.1),
-        "reward_so_far": 0.0,
-        "shaft_speed": 60.0,
-        "wind_from": 90.0,
-        "current_speed": 0.5,
-        "current_towards": 270.0,
+        "heading, deg": (0.0, turned),
+        "cross-track error, m": (20.0, 20.0),
+        "heading error, deg": (np.degrees(0.1), np.degrees(0.1) - turned),
+        "rudder, deg": (0.0, 10.0 * np.sin(END / 20.0)),
+        "speed through water, m/s": (5.0, 5.0),
+        "yaw rate, deg/s": (np.degrees(0.002), np.degrees(0.002)),
+        "heel, deg": (0.0, turned),
+        "shaft speed, 1/min": (60.0, 90.0),
+        "wind speed, m/s": (8.0, 8.0),
+        "wind from, deg": (90.0, 90.0),
+        "current speed, m/s": (0.5, 0.5),
+        "current towards, deg": (270.0, 270.0),
+        "reward so far": (0.0, -0.5 * STEPS),
+        "cross track, reward so far": (0.0, -0.4 * STEPS),
+        "rudder, reward so far": (0.0, -0.1 * STEPS),
     }
-    first = {name: series[name][0] for name in expected}
-    assert first == pytest.approx(expected)
-    assert series["rudder_order"][0] == series["delta"][1]
-    assert series["heel"][-1] == pytest.approx(np.degrees(0.002 * END))
-    assert series["psi"][1] == 0.5729578  # seven digits
-    assert [one["label"] for one in data["quantities"]] == [
-        "heading",
-        "cross-track error",
-        "heading error",
-        "rudder",
-        "speed through water",
-        "yaw rate",
-        "heel",
-        "shaft speed",
-        "wind speed",
-        "wind from",
-        "current speed",
-        "current towards",
-        "reward so far",
-    ]
+    assert list(found) == list(expected)
+    for panel, ends in expected.items():
+        np.testing.assert_allclose(found[panel], ends, rtol=1e-5, atol=1e-6)
+    assert len(histories(page)["rudder, deg"]) == 2  # with its order
+    assert str(2**80) in page
+    assert "time limit" in page
 
 
 def test_what_was_not_recorded_or_is_calm_is_not_shown(shown):
     calm = {**episode().states, "wind_speed": np.zeros(STEPS + 1)}
     for name in ("u", "current_east"):
         del calm[name]
-    (run,) = shown(states=calm)["runs"]
-    assert not run["series"].keys() & {"speed", "wind_speed", "current_speed", "heel"}
+    panels = " ".join(histories(shown(states=calm)))
+    for word in ("speed", "wind", "current", "heel"):
+        assert word not in panels
 
 
 @pytest.mark.parametrize("first", [-0.1, 7.0, 0.0, 3.0])
@@ -141,14 +146,13 @@ def test_headings_start_within_a_turn_and_go_on_without_a_jump(shown, first):
     heading = known["psi"] + first
     wrapped = np.arctan2(np.sin(heading), np.cos(heading))
     order = np.full(STEPS + 1, first)
-    (run,) = shown(states={**known, "psi": wrapped, "set_point": order})["runs"]
-    found = run["series"]["psi"]
-    assert found[0] == pytest.approx(np.degrees(first) % 360.0, abs=1e-4)
-    assert found[-1] - found[0] == pytest.approx(np.degrees(0.002 * END), abs=1e-3)
-    # the error is the short way round
-    assert run["series"]["heading_error"][-1] == pytest.approx(
-        -np.degrees(0.002 * END), abs=1e-3
-    )
+    found = histories(shown(states={**known, "psi": wrapped, "set_point": order}))
+    (begin, end), _ = found["heading, deg"]
+    turned = np.degrees(0.002 * END)
+    assert begin == pytest.approx(np.degrees(first) % 360.0, abs=1e-3)
+    assert end - begin == pytest.approx(turned, abs=1e-3)
+    ((_, error),) = found["heading error, deg"]  # the short way round
+    assert error == pytest.approx(-turned, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -161,34 +165,62 @@ def test_headings_start_within_a_turn_and_go_on_without_a_jump(shown, first):
     ],
 )
 def test_how_an_episode_ended_is_told(shown, flags, words):
-    assert shown(**flags)["runs"][0]["outcome"] == words
+    assert f"<td>{words}</td>" in shown(**flags)
 
 
-def test_an_episode_of_one_step_has_a_page(shown):
+def test_the_ship_moves_through_the_frames_to_its_end(shown):
     known = episode()
-    (run,) = shown(
+    page = shown(
         states={name: values[:2] for name, values in known.states.items()},
         commands={},
         reward_parts={},
         info={},
         rewards=known.rewards[:1],
         actions=known.actions[:1],
-    )["runs"]
-    assert run["steps"] == 1
+    )
+    start = page.index('Plotly.addFrames("plot-chart-figure",')
+    frames, _ = json.JSONDecoder().raw_decode(page, page.index("[", start))
+    assert [frames[0]["name"], frames[-1]["name"]] == ["0.0", f"{DT:.1f}"]
+    for frame, heading, north in ((frames[0], 0.0, 0.0), (frames[-1], 0.01, 25.0)):
+        (hull,) = frame["data"]
+        bow = 20.0 + 50.0 * np.sin(heading), north + 50.0 * np.cos(heading)
+        assert (hull["x"][0], hull["y"][0]) == pytest.approx(bow, abs=0.01)
+    assert frames[0]["data"][0]["x"][1] == 30.0  # half a beam to starboard
 
 
 @pytest.mark.parametrize(
     "name", ["</script><script>alert(1)//", "<!--<script>", "$data ${t}"]
 )
 def test_no_name_breaks_the_page(tmp_path, name):
+    plain = tmp_path / "plain.json"
+    episode().save(plain)
+    write_replay([plain], tmp_path / "plain.html")
+    expected = (tmp_path / "plain.html").read_text().count("</script>")
     episode(model=name, environment=name).save(tmp_path / "one.json")
     write_replay([tmp_path / "one.json"], tmp_path / "replay.html")
     page = (tmp_path / "replay.html").read_text()
-    assert page.count("</script>") == 3
-    assert data_of(page)["runs"][0]["model"] == name
-    assert name not in re.search(r"<title>(.*?)</title>", page)[1] or "<" not in name
+    assert page.count("</script>") == expected
+    assert "<script>alert" not in page
     assert "default-src 'none'" in page  # it loads nothing
-    assert re.findall(r'(?:src|href)="([^"]*)"', page) == ["data:,"]
+
+
+@pytest.mark.skipif(COMMAND is None, reason="no chromium is installed")
+def test_a_browser_without_network_moves_the_ship(shown, tmp_path):
+    shown()
+    page = (tmp_path / "replay.html").as_uri()
+    browser = Browser()
+    try:
+        browser.open(page)
+        plot = "document.getElementById('plot-chart-figure')"
+        browser.wait(f"{plot}?._transitionData?._frames?.length === 200")
+        end = f"Plotly.animate({plot}, ['{END:.1f}'], {{ mode: 'immediate' }})"
+        browser.run(f"void {end}")
+        north = f"{plot}.data.at(-1).y[0]"
+        browser.wait(f"{north} > {5.0 * END}")
+        assert browser.complaints == []
+        assert browser.requests == [page]
+    finally:
+        browser.close()
 
 
 def shipgym(*arguments):
@@ -207,11 +239,9 @@ def test_the_command_writes_the_page(recorded):
     episode(model="container", length=175.0).save(other)
     answer = shipgym(recorded, other, "--out", recorded.with_name("replay.html"))
     assert (answer.exit_code, answer.stderr) == (0, "")
-    runs = data_of(recorded.with_name("replay.html").read_text())["runs"]
-    assert [(run["name"], run["model"]) for run in runs] == [
-        ("episode-00000", "mariner"),
-        ("container", "container"),
-    ]
+    page = recorded.with_name("replay.html").read_text()
+    rows = re.findall(r"<tr><td>(.*?)</td><td>.*?</td><td>(.*?)</td>", page)
+    assert rows == [("episode-00000", "mariner"), ("container", "container")]
 
 
 @pytest.mark.parametrize(
@@ -265,5 +295,5 @@ def test_runs_are_called_by_what_tells_their_files_apart(tmp_path):
         path.parent.mkdir()
         episode().save(path)
     write_replay(paths, tmp_path / "replay.html")
-    runs = data_of((tmp_path / "replay.html").read_text())["runs"]
-    assert [run["name"] for run in runs] == ["lq/episode-00000", "pid/episode-00000"]
+    rows = re.findall(r"<tr><td>(.*?)</td>", (tmp_path / "replay.html").read_text())
+    assert rows == ["lq/episode-00000", "pid/episode-00000"]
