@@ -15,14 +15,13 @@ package cma).
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from agents.controllers.controller import Controller
 from agents.controllers.designs import design
-from agents.controllers.side_by_side import side_by_side
 from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask
 from agents.training.controller_space import Setting, search_space
@@ -349,3 +348,23 @@ def has_margin(controller: Controller) -> bool:
     margins = controller.margins
     has_gain_margin = margins.gain_margin >= least_gain_margin
     return has_gain_margin and margins.phase_margin_deg >= least_phase_margin_deg
+
+
+def side_by_side(controllers: Sequence[Controller], ships_each: int) -> Controller:
+    """One controller that steers the ships of many, some for each, in their order.
+
+    They are of one kind that steers by its law alone. The numbers of a law are floats
+    or arrays with an entry for each ship (`agents.controllers.law`), and so are its
+    gains: many settings are tried at the cost of few.
+    """
+    first = controllers[0]
+    gains = {}
+    for name in first.gains:
+        values = [controller.gains[name] for controller in controllers]
+        gains[name] = np.repeat(values, ships_each)
+    parts: dict[str, Any] = {"gains": gains}
+    if first.has_autopilot:
+        guides: Sequence[Any] = controllers
+        led = [guide.autopilot for guide in guides]
+        parts["autopilot"] = side_by_side(led, ships_each)
+    return replace(first, **parts)

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from agents import LQ, PID, PreviewLQ, WheelOver, check_controller, load_agent
 from agents.controllers.preview_lq import summed_weight, weighed_turn
-from agents.controllers.side_by_side import side_by_side
 from agents.rollouts.rollout import episode_costs
+from agents.training.controller_search import side_by_side
 from shipgym import load_model
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
