@@ -115,21 +115,28 @@ def _chart(runs: Mapping[str, Episode]) -> Figure:
     for number, (name, episode) in enumerate(runs.items()):
         hull = _hull(episode, 0.0)
         bow = {"size": [8, 0, 0, 0, 0, 0]}  # where the ship is too small to be seen
-        colour = _colour(number)
-        ship = line(**hull, name=name, colour=colour, mode="lines+markers", marker=bow)
+        ship = line(
+            hull["x"],
+            hull["y"],
+            name,
+            _colour(number),
+            mode="lines+markers",
+            marker=bow,
+        )
         traces.append(ship.update(fill="toself", showlegend=False))
 
     north_axis = axis("north, m", scaleanchor="x", scaleratio=1)
     figure = panels([Panel(traces, "east, m", north_axis)], 620, hovermode="closest")
     end = max(episode.n_steps * episode.dt for episode in runs.values())
-    times = np.linspace(0.0, end, FRAMES)
     ships = list(range(first_ship, len(traces)))
+    labels = []
     frames = []
-    for time in times.tolist():
+    for time in np.linspace(0.0, end, FRAMES).tolist():
         hulls = [_hull(episode, time) for episode in runs.values()]
-        frames.append({"name": f"{time:.1f}", "data": hulls, "traces": ships})
+        labels.append(f"{time:.1f}")
+        frames.append({"name": labels[-1], "data": hulls, "traces": ships})
     figure.frames = frames
-    return _with_slider(figure, [frame["name"] for frame in frames])
+    return _with_slider(figure, labels)
 
 
 def _with_slider(figure: Figure, times: Sequence[str]) -> Figure:
