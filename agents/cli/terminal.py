@@ -13,6 +13,8 @@ from rich.segment import Segment
 from rich.text import Text
 
 if TYPE_CHECKING:
+    from rich.progress import Progress as Bars
+
     from agents.training.evaluation import TrainingProgress
     from identification.progress import Progress
 
@@ -89,6 +91,26 @@ def print_error(message: str) -> None:
     err.print(Text.assemble(("error: ", "bold red"), message), soft_wrap=True)
 
 
+def _bars(name: str, *more: str) -> Bars:
+    """Bars on standard error: fields of a task, a bar, its share and remaining time."""
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn(f"{{{name}}}", markup=False),
+        BarColumn(bar_width=32),
+        TaskProgressColumn(),
+        TimeRemainingColumn(elapsed_when_finished=True),
+    )
+    ends = [TextColumn(f"{{{field}}}", markup=False) for field in more]
+    return Progress(*columns, *ends, console=err)
+
+
 @contextmanager
 def progress_bars() -> Iterator[Progress | None]:
     """Bars on standard error, one for each stage, with the remaining time.
@@ -99,21 +121,7 @@ def progress_bars() -> Iterator[Progress | None]:
     if console.quiet or not err.is_terminal:
         yield None
         return
-    from rich.progress import (
-        BarColumn,
-        TaskProgressColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-    from rich.progress import Progress as Bars
-
-    columns = (
-        TextColumn("{task.description:<30}", markup=False),
-        BarColumn(bar_width=32),
-        TaskProgressColumn(),
-        TimeRemainingColumn(elapsed_when_finished=True),
-    )
-    with Bars(*columns, console=err) as bars:
+    with _bars("task.description:<30") as bars:
         tasks: dict[str, Any] = {}
 
         def on_progress(stage: str, done: int, total: int) -> None:
@@ -150,22 +158,7 @@ def training_bar() -> Iterator[Callable[[TrainingProgress], None] | None]:
     if not err.is_terminal:
         yield _print_evaluation
         return
-    from rich.progress import (
-        BarColumn,
-        TaskProgressColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-    from rich.progress import Progress as Bars
-
-    columns = (
-        TextColumn("training"),
-        BarColumn(bar_width=32),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[costs]}", markup=False),
-    )
-    with Bars(*columns, console=err) as bars:
+    with _bars("task.description", "task.fields[costs]") as bars:
         task = bars.add_task("training", total=None, costs="")
 
         def on_progress(now: TrainingProgress) -> None:

@@ -8,17 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from jinja2 import UndefinedError
 
 from agents.cli.autopilot import print_autopilot
 from agents.cli.standard_trials import StandardTrials
-from agents.cli.trials_page import readable_index, write_page
+from agents.cli.trials_page import write_page
 from agents.output import check_page
-from agents.verification.figures import translucent
 from agents.verification.page import write_report
 from shipgym import InputError, Trial, load_model
 from shipgym.manoeuvres import IndexInterval, standard_manoeuvres
-from shipgym.pages import environment, fixed, number, percent
+from shipgym.pages import environment, number, percent
 from shipgym.plots import graph_objects
 from tests.agents.browser import COMMAND, Browser
 from tests.agents.conftest import DRAWS
@@ -191,11 +189,6 @@ def test_what_is_missing_is_a_dash():
     assert "<td>\N{EN DASH}</td>" in shown("{{ parts.row(none) }}")
 
 
-def test_a_variable_that_is_missing_is_an_error():
-    with pytest.raises(UndefinedError, match="'absent' is undefined"):
-        shown("{{ parts.note(absent) }}")
-
-
 def test_hostile_names_of_ship_trials_and_autopilots_stay_text(chain, tmp_path):
     """Escaped in the page's text, and unable to end the scripts that draw
     the figures."""
@@ -253,20 +246,6 @@ def test_hostile_names_of_models_and_manoeuvres_stay_text(tmp_path):
     )  # window, title, head, and why it was refused
 
 
-@pytest.mark.parametrize(
-    ("index", "words"),
-    [
-        ("overshoot_1_deg", "overshoot 1, deg"),
-        ("loop_height_deg_s", "loop height, deg/s"),
-        ("tactical_diameter_lengths", "tactical diameter, ship lengths"),
-        ("period_s", "period, s"),
-        ("steady_speed_ratio", "steady speed ratio"),
-    ],
-)
-def test_an_index_is_told_in_words_with_its_unit(index, words):
-    assert readable_index(index) == words
-
-
 def test_a_page_that_cannot_be_drawn_is_refused_before_any_work(tmp_path, monkeypatch):
     check_page(tmp_path / "trials.html", plots=True)
     monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
@@ -299,17 +278,9 @@ def test_numbers_have_three_significant_digits(value, shown):
     assert number(value) == shown
 
 
-def test_a_minus_is_a_minus():
-    assert fixed(-1.0, 1) == "\N{MINUS SIGN}1.0"
-
-
 @pytest.mark.parametrize(
     ("share", "shown"),
     [(0.0, "0 %"), (0.004, "< 1 %"), (0.5, "50 %"), (0.995, "> 99 %"), (1.0, "100 %")],
 )
 def test_a_probability_is_certain_only_if_it_is(share, shown):
     assert percent(share) == shown
-
-
-def test_a_translucent_colour():
-    assert translucent("#1d70b8", 0.5) == "rgba(29,112,184,0.5)"

@@ -14,14 +14,6 @@ from identification import progress
 NOW = {"total": 20_000, "seconds": 12.4, "cost": 5.0, "best_cost": 4.5}
 
 
-def test_a_training_without_a_terminal_is_told_line_by_line(capsys):
-    now = SimpleNamespace(steps=1000, evaluated=True, lq_cost=6.25, **NOW)
-    with terminal.training_bar() as tell:
-        tell(now)
-    told = "step 1,000 of 20,000, 12 s: cost 5.00, best 4.50, LQ 6.25"
-    assert capsys.readouterr().err.splitlines() == [told]
-
-
 @pytest.mark.parametrize("quiet", [False, True])
 def test_bars_are_shown_on_a_terminal_that_is_not_to_be_quiet(quiet, monkeypatch):
     """With a share only where the total is known."""

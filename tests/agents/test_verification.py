@@ -13,7 +13,6 @@ from agents.verification.refusal import lost_track
 from agents.verification.result import track_metrics
 from agents.verification.tracks import keep_track, track_task
 from agents.verification.tuned import holds_draws, model_task
-from agents.verification.verify import unique_keys
 from identification.progress import PROGRESS
 from shipgym import Current, InputError, Weather, load_model
 from shipgym.tasks.task import path_following_task
@@ -199,10 +198,6 @@ def test_what_is_wrong_is_said_before_a_file_is_read(given, message, tmp_path):
     with pytest.raises(InputError, match=message):
         build_autopilot("no such ship.toml", tmp_path / "out", **given)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_names_that_were_there_before_get_a_number():
-    assert unique_keys(["lq", "pid", "lq", "lq"]) == ["lq", "pid", "lq-2", "lq-3"]
 
 
 def test_a_search_leaves_models_drawn_that_a_design_loses():
