@@ -94,11 +94,6 @@ class ShipFile:
             undecided=undecided,
         )
 
-    def completed_particulars(self) -> Particulars:
-        """Particulars with absent ones estimated (:meth:`Particulars.completed`)."""
-        with placed(str(self.path)):
-            return self.particulars.completed()
-
     def trials(self, use: str | None = None, *, decided: bool = True) -> list[Trial]:
         """Read the trials of a use, by default all but those to skip.
 

@@ -137,7 +137,6 @@ def test_a_ship_file_gives_particulars_steering_gear_and_defaults(folder):
     )
     assert ship.particulars.estimated == frozenset()
     assert ship.steering == SteeringGear(35.0, 15.8)
-    assert ship.completed_particulars() == ship.particulars.completed()
     assert ship.identify == {"structure": "abkowitz", "method": "tls-svm"}
 
 
@@ -185,14 +184,6 @@ def test_length_and_one_trial_are_enough(tmp_path):
     assert ship.identify == {}
     assert trial.use == "fit"
     assert trial.derived == {"psi"}
-    with pytest.raises(
-        InputError,
-        match=(
-            r"ship\.toml: particulars of ship: mass is not given and cannot be"
-            r" estimated"
-        ),
-    ):
-        ship.completed_particulars()
 
 
 @pytest.mark.parametrize(
