@@ -59,7 +59,7 @@ def _smoothed(samples: Floats, values: Floats, spacing: int) -> tuple[Any, float
     inner = samples[spacing : n - spacing : spacing]
     last = np.repeat(samples[-1], degree + 1)
     knots = np.concatenate([first, inner, last])
-    spline = make_lsq_spline(samples, values, knots, k=degree)
+    spline = make_lsq_spline(samples, values, knots, k=degree, method="norm-eq")
 
     residual = np.linalg.norm(values - spline(samples))
     free = max(n - inner.size - degree - 1, 1)
