@@ -6,7 +6,6 @@ import pytest
 
 from agents import LQ, IntegralLineOfSight, sail
 from agents.cli.tables import ranking_table
-from agents.jobs import JobEngine
 from agents.verification.chain import build_autopilot, verify
 from agents.verification.index_uncertainty import (
     nominal_runs,
@@ -19,7 +18,6 @@ from agents.verification.tracks import keep_track
 from identification import identify
 from identification.judging.warnings import model_warnings
 from shipgym import InputError, ShipFile, load_model
-from shipgym.manoeuvres import Criterion, IndexInterval
 from tests.agents.policies import random_policy
 
 
@@ -118,23 +116,6 @@ def test_a_learned_guest_flies_beside_them_without_gains_and_margins(chain, tmp_
     assert float(rows["LQ"]) > 1.0
 
 
-def test_guests_of_one_name_are_told_apart(chain):
-    model = chain[1].model
-    guests = [
-        LQ.from_model(model, integral_lengths=20.0),
-        LQ.from_model(model, integral_lengths=80.0),
-    ]
-    told = verification_metrics(
-        verify(model, 4, 1, guests=guests, designs=("pid", "lq"))
-    )
-    assert (
-        set(told["controllers"])
-        == set(told["ranking"])
-        == {"pid", "lq", "lq-2", "lq-3"}
-    )
-    assert told["controllers"]["lq-2"]["gains"] == guests[0].gains
-
-
 @pytest.mark.parametrize("made_for", ["paths", "another ship"])
 def test_a_guest_of_another_environment_or_ship_is_wrong_input(
     demo, tmp_path, made_for
@@ -154,15 +135,6 @@ def test_a_guest_of_another_environment_or_ship_is_wrong_input(
     with pytest.raises(InputError, match=f"agent '.*guest.json': .*{said}"):
         build_autopilot(demo, tmp_path / "out", draws=4, agents=[path])
     assert not (tmp_path / "out").exists()
-
-
-def test_a_cluster_that_does_not_answer_is_no_fault_of_the_model(demo, tmp_path):
-    where = JobEngine(engine="ray", address="127.0.0.1:1")
-    with pytest.raises(
-        InputError, match=r"^address: expected a Ray cluster|not installed"
-    ):
-        build_autopilot(demo, tmp_path / "out", draws=4, where=where)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_unknown_guest_is_refused_with_the_nearest_name(tmp_path):
@@ -252,14 +224,6 @@ def test_unstable_draws_count_as_failed_and_are_never_dropped():
 def _fields(model):
     names = ("name", "structure", "particulars", "steering", "coefficients")
     return {name: getattr(model, name) for name in names}
-
-
-def test_a_criterion_without_value_has_no_quantile_and_does_not_pass():
-    drawn = IndexInterval(3.0, np.array([3.0, np.nan]), np.array([False, True]))
-    criterion = Criterion(3.0, 4.5, True, "ship lengths", "5.3.1", drawn)
-    assert criterion.share_passed == 0.5
-    assert criterion.interval == (3.0, None)
-    assert criterion.to_dict()["without_value"] == criterion.to_dict()["ran_away"] == 1
 
 
 def verified(**changes: float) -> dict:

@@ -101,19 +101,6 @@ def test_the_files_name_what_they_were_made_with(folder):
     assert table["seed"].tolist() == 2 * [FIRST + k for k in range(N)]
 
 
-@pytest.mark.parametrize(
-    ("asked", "said"),
-    [
-        (("pdi", "calm"), "controller: expected one of 'pid', 'lq', got 'pdi'"),
-        (("pid", "clam"), "task: expected one of 'calm', got 'clam'"),
-        (("pid", "calm", "cots"), "figure: expected one of .* got 'cots'"),
-    ],
-)
-def test_figures_of_unknown_names_are_refused(folder, asked, said):
-    with pytest.raises(InputError, match=said):
-        load_results(folder).figures(*asked)
-
-
 def test_what_was_run_is_kept_and_not_run_again(copy, suite):
     with pytest.raises(InputError, match=r"already contains results.*--resume"):
         benchmark("pid,lq", suite, "calm", copy, episodes=N)
@@ -145,19 +132,6 @@ def test_a_controller_that_fails_or_cannot_run_a_task_is_named_and_comes_last(su
         f"broken failed in 4 episodes of calm: {cell['failure']}",
     ]
     assert result.figures("other", "calm").size == 0
-
-
-def test_where_no_controller_can_run_a_task_there_are_no_results(suite, tmp_path):
-    words = ["--controllers", "math:sqrt", "--suite", suite, "--episodes", 1]
-    answer = shipgym(*words, "--workers", 1, "--out", tmp_path / "new")
-    assert (answer.exit_code, answer.stdout) == (2, "")
-    warning, error = answer.stderr.splitlines()
-    assert warning.startswith("warning: 'math:sqrt' runs as part of this command")
-    assert error.startswith(
-        "error: controllers: no controller could run any task; 'sqrt' in 'calm':"
-        " TypeError: must be "
-    )
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_ranking_is_of_the_ship_and_the_rest_stands_beside_it(suite, tmp_path):
@@ -243,20 +217,6 @@ def test_wrong_controllers_are_refused(given, said):
         read_entries(given)
 
 
-@pytest.mark.parametrize(
-    ("source", "said"),
-    [
-        ("json:no_such_thing", "got 'json:no_such_thing', which cannot be imported"),
-        ("math:pi", r"'math:pi': expected a controller.* got 3.14\d*"),
-        ("{task}-x.json", "there is no file of '{task}-x.json' for task 'calm'"),
-        (lambda task: 3, "with `predict` for task 'calm', got 3"),
-    ],
-)
-def test_one_that_cannot_be_made_for_a_task_is_refused(source, said):
-    with pytest.raises(InputError, match=said):
-        Entry("x", source).policies(CALM)
-
-
 def test_controllers_are_given_as_texts_functions_objects_and_by_name():
     class Iterable(LQ):
         def __iter__(self):
@@ -323,22 +283,6 @@ def test_training_runs_are_files_of_one_controller(suite, tmp_path):
     assert result.figures("mine", "calm").shape == (2, 2)
     about = result.summary["controllers"]["mine"]
     assert (about["runs"], len(about["files"])) == (2, 2)
-
-
-def test_functions_of_ones_own(suite, tmp_path, monkeypatch):
-    (tmp_path / "my_autopilots.py").write_text(
-        "from agents import LQ\n\n\ndef gentle(task):\n    return"
-        " LQ.from_model(task.ship, integral_lengths=50.0)\n"
-    )
-    monkeypatch.chdir(tmp_path)
-    before = list(sys.path)
-    by_text = benchmark("my_autopilots:gentle", suite, "calm", episodes=2)
-    gentle = {"gentle": lambda task: LQ.from_model(task.ship, integral_lengths=50.0)}
-    by_function = benchmark(gentle, suite, "calm", episodes=2)
-    assert sys.path == before  # the working folder is on it for this controller only
-    costs, others = (one.figures("gentle", "calm") for one in (by_text, by_function))
-    np.testing.assert_array_equal(costs, others)
-    assert len(by_text.summary["controllers"]["gentle"]["files"]) == 1
 
 
 # --- tasks and suites of a user's own
@@ -439,20 +383,6 @@ def test_broken_results_are_refused(copy, name, old, new, said):
     path.write_bytes(content.replace(old, new))
     with pytest.raises(InputError, match=said):
         load_results(copy)
-
-
-def test_a_folder_takes_the_results_of_one_suite_only(copy, suite, tmp_path):
-    other = tmp_path / "other"
-    other.mkdir()
-    (other / "letter.txt").write_text("")
-    renamed = write_suite(other, TEXT.replace("small-v1", "other-v1"))
-    for folder, which, said in (
-        (copy, renamed, "expected results of suite 'other-v1', got those of 'small"),
-        (copy / "results.json", suite, "expected a folder .* got a file"),
-        (other, suite, "or nothing, got 'letter.txt'"),
-    ):
-        with pytest.raises(InputError, match=said):
-            benchmark("pid", which, "calm", folder, resume=True, episodes=1)
 
 
 # --- the command

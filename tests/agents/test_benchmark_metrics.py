@@ -3,7 +3,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from agents import LQ
 from agents.rollouts.metrics import (
     evaluate,
     fuel_per_distance,
@@ -13,7 +12,6 @@ from agents.rollouts.metrics import (
     worst_step_cost,
 )
 from agents.suites.suite import BenchmarkTask
-from shipgym import load_model
 
 KEEPING = BenchmarkTask(
     "keeping", "course-keeping", "mariner", options={"episode_steps": 250}
@@ -22,11 +20,6 @@ PATH = BenchmarkTask(
     "path", "path-following", "mariner", options={"episode_steps": 450, "n_legs": 1}
 )
 SEEDS = np.arange(1_000_000, 1_000_006)
-
-
-@pytest.fixture(scope="module")
-def lq():
-    return LQ.from_model(load_model("mariner"))
 
 
 class Steers:
@@ -43,24 +36,6 @@ class Steers:
 
 def steady(rudder):
     return Steers(lambda call, seen: np.full((len(seen), 1), rudder, dtype=np.float32))
-
-
-def test_an_episode_does_not_depend_on_those_beside_it(lq):
-    many, one = evaluate(lq, PATH, SEEDS), evaluate(lq, PATH, SEEDS[2:3])
-    for name, values in one.figures.items():
-        np.testing.assert_array_equal(values[0], many.figures[name][2], err_msg=name)
-
-
-@pytest.mark.parametrize("task", [KEEPING, PATH], ids=lambda task: task.name)
-def test_the_worst_step_is_what_the_tasks_charge_for_the_rest(task):
-    found = evaluate(
-        steady(1.0), task, SEEDS[:2]
-    )  # hard over: she turns until control is lost, or aground
-    end, steps = found.figures["cost_end"], found.run.steps
-    assert found.figures["terminated"].all()
-    np.testing.assert_allclose(
-        end, worst_step_cost(task.task) * (task.task.episode_steps - steps), rtol=1e-12
-    )
 
 
 def made_up(task, way=None, **states):

@@ -5,7 +5,6 @@ from scipy.stats import gmean
 from agents.benchmarking.statistics import (
     Draws,
     improvement,
-    interval,
     mean_cost,
     mean_score,
 )
@@ -40,12 +39,6 @@ def test_training_runs_that_differ_widen_the_interval():
     narrow, wide = mean_cost(alike, draws, 0), mean_cost(apart, draws, 0)
     assert narrow["value"] == pytest.approx(wide["value"])
     assert wide["high"] - wide["low"] > 10.0 * (narrow["high"] - narrow["low"])
-
-
-def test_an_interval_is_of_percentiles_and_has_no_ends_without_numbers():
-    assert values(interval(1.0, np.arange(1001.0))) == pytest.approx([1.0, 25.0, 975.0])
-    assert values(interval(np.nan, np.arange(5.0))) == [None, None, None]
-    assert values(interval(1.0, np.array([1.0, np.nan]))) == [1.0, None, None]
 
 
 def test_a_score_is_the_geometric_mean_over_the_tasks_that_the_rule_ran():

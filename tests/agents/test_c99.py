@@ -3,8 +3,6 @@
 import ctypes
 import json
 import re
-import shutil
-import subprocess
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -30,7 +28,6 @@ from agents.controllers.law import Turns
 from agents.export.autopilot import AUTOPILOT_INPUTS, BridgeInput
 from agents.export.autopilot_c99 import autopilot_source
 from agents.export.ship_c99 import ShipInput, advance, ship_source
-from agents.export.source import checked_name
 from shipgym.engine.motion import Motion
 from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError
@@ -377,36 +374,6 @@ def test_a_name_that_c_does_not_take_is_refused(name):
         autopilot_source(HEADING["pid"], name)
 
 
-def test_a_long_name_is_shown_by_its_beginning():
-    with pytest.raises(InputError) as refused:
-        checked_name("x" * 100)
-    assert f"got '{'x' * 60}'" in str(refused.value)
-    source = ship_source(replace(MARINER, name="m" * 300), "ship")
-    title = source.header.partition("*/")[0]
-    assert "Ship model '" + "m" * 108 + "...\n" in title  # 120 characters
-
-
-@pytest.mark.parametrize(
-    ("name", "shown"),
-    [
-        (
-            "Elise's Großsegler №3 <5 m/s> & 50 %",
-            "Elise's Großsegler №3 <5 m/s> & 50 %",
-        ),
-        ("a */ int b; /* c", "a * / int b; / * c"),
-        ("a /*/ b **//", "a / * / b ** //"),
-        ("why??/ what???", "why? ?/ what? ? ?"),
-        ("one\ntwo\\", "one<U+000A>two\\"),
-        ("\u202etfel\u2028\ud800", "<U+202E>tfel<U+2028><U+D800>"),
-        ("船 🚢 é", "船 🚢 é"),
-    ],
-)
-def test_a_comment_keeps_its_characters_and_ends_where_it_should(name, shown, tmp_path):
-    source = autopilot_source(replace(HEADING["pid"], model_name=name), "pid")
-    assert source.header.startswith(f"/* Autopilot 'pid' for model '{shown}'\n")
-    built(tmp_path, "pid", source.header, source.source)
-
-
 def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
     HEADING["pid"].save(tmp_path / "pid.json")
     run = CliRunner().invoke
@@ -519,34 +486,6 @@ def test_a_hash_that_is_none_does_not_become_c():
     assert 'PID_MODEL_SHA256 "unknown"' in autopilot_source(agent, "pid").header
 
 
-def broken_rules(source, folder):
-    """Rules of MISRA C:2012 that cppcheck finds broken."""
-    (folder / "it.h").write_text(source.header)
-    (folder / "it.c").write_text(source.source)
-    command = "cppcheck --addon=misra --std=c99 --enable=style --quiet"
-    command += " -U__cplusplus -U__FINITE_MATH_ONLY__ it.c"
-    done = subprocess.run(
-        [*command.split(), "--suppress=missingIncludeSystem"],
-        cwd=folder,
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    return set(re.findall(r"misra-c2012-([\d.]+\d)", done.stderr))
-
-
-@pytest.mark.skipif(not shutil.which("cppcheck"), reason="cppcheck is missing")
-@pytest.mark.parametrize("name", ["lq", "orders", "mariner"])
-def test_the_page_names_every_deviation_from_misra(name, tmp_path):
-    page = (DOCS / "deployment.md").read_text(encoding="utf-8")
-    named = set(re.findall(r"(?m)^\| (\d+\.\d+) \| ", page))
-    if name == "mariner":
-        source = ship_source(MARINER, "it")
-    else:
-        source = autopilot_source((HEADING | LEARNED)[name], "it")
-    assert broken_rules(source, tmp_path) <= named
-
-
 def test_the_control_loop_of_the_page_compiles(tmp_path):
     page = (DOCS / "howto" / "control_loop.md").read_text(encoding="utf-8")
     (loop,) = re.findall(r"```c\n(.*?)```", page, re.DOTALL)
@@ -560,12 +499,3 @@ void wait_for_next_interval(double seconds) { (void)seconds; }
 void control_loop(void);
 """
     built(tmp_path, "lq", source.header, source.source + loop + stubs)
-
-
-def test_a_ship_without_particulars_for_wind_is_written_without_it_and_says_so():
-    unknown = replace(MARINER.particulars, beam=None, draught=None)
-    source = ship_source(replace(MARINER, particulars=unknown), "ship")
-    assert set(source.inputs) == {"rudder", "current_north", "current_east"}
-    (note,) = source.notes
-    assert note.startswith("wind is left out: ")
-    assert "wind_speed" in ship_source(MARINER, "ship").inputs

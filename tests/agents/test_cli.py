@@ -2,13 +2,11 @@
 
 import errno
 import json
-import os
 import re
 import resource
 import shlex
 import subprocess
 import sys
-import warnings
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,7 +14,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from agents.cli import app, main, reproduction
+from agents.cli import app, reproduction
 from agents.cli.command import CommandGroup, shared_options
 from agents.jobs import JobError
 from shipgym import InputError, ManoeuvreError, UnstableModelError, load_model
@@ -89,27 +87,6 @@ def test_every_command_has_json_and_quiet_and_an_example_that_it_takes(name):
     assert begin == name
     assert not command.make_context(name, example).args
     assert command.epilog in " ".join(shipgym(name, "--help").stdout.split())
-
-
-@pytest.mark.parametrize(
-    ("typed", "completed"),
-    [("shipgym auto", "autopilot"), ("shipgym identify --struct", "--structure")],
-)
-def test_a_shell_completes_commands_and_the_options_of_identify(typed, completed):
-    words = {
-        "COMP_WORDS": typed,
-        "COMP_CWORD": str(typed.count(" ")),
-        "_SHIPGYM_COMPLETE": "complete_bash",
-    }
-    answer = subprocess.run(
-        [sys.executable, "-c", "from agents.cli import main; main()"],
-        cwd=ROOT,
-        env=os.environ | words,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert completed in answer.stdout.split(), answer.stderr
 
 
 @pytest.mark.parametrize(
@@ -309,23 +286,6 @@ def test_an_empty_argument_is_refused_by_the_name_of_its_option(words, message):
     answer = shipgym(*words)
     assert answer.exit_code == 2
     assert message in " ".join(answer.stderr.split())
-
-
-def run_main(monkeypatch, command):
-    """Run `shipgym` with another program in place of its commands."""
-    monkeypatch.setattr("agents.cli.app", lambda prog_name: command())
-    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
-    main()
-
-
-def test_a_warning_is_one_line_on_standard_error(monkeypatch, capsys):
-    def command():
-        with warnings.catch_warnings():
-            warnings.simplefilter("always")
-            warnings.warn("the cache is full", stacklevel=1)
-
-    run_main(monkeypatch, command)
-    assert capsys.readouterr() == ("", "warning: the cache is full\n")
 
 
 @pytest.fixture

@@ -1,22 +1,12 @@
 """FMUs are valid for FMPy and simulate as the library does."""
 
-import os
-import re
-import shutil
-import signal
-import subprocess
-import sys
-import time
-from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
-from xml.etree import ElementTree
 from zipfile import ZipFile
 
 import fmpy
 import numpy as np
 import pytest
-from fmpy import fmi2, validation
+from fmpy import validation
 
 from agents import LQ, WheelOver
 from agents.export import fmu
@@ -148,12 +138,6 @@ def test_a_binary_stands_where_the_standard_has_it_beside_its_sources(
     assert {"modelDescription.xml", "sources/lq_fmi.c", "sources/lq.h"} < names
 
 
-def known(path):
-    """Variables of an FMU by name."""
-    description = fmpy.read_model_description(str(path))
-    return {one.name: one for one in description.modelVariables}
-
-
 def test_the_description_has_base_units_and_the_users_letters(tmp_path):
     path = tmp_path / "pilot.fmu"
     name = "Elise <\"&'> Großsegler \x00 ]]>"
@@ -167,146 +151,6 @@ def test_the_description_has_base_units_and_the_users_letters(tmp_path):
     assert units <= bases.keys()
 
 
-@pytest.fixture(scope="module")
-def logged(tmp_path_factory):
-    """An instance of a ship, and the messages that it logs."""
-    path = tmp_path_factory.mktemp("logged") / "ship.fmu"
-    write_fmu(ship_source(MARINER, "ship"), path)
-    messages = []
-
-    def write(*arguments):
-        status, category, message = arguments[-3:]
-        messages.append((status, category.decode(), message.decode()))
-
-    given = {
-        "guid": fmpy.read_model_description(str(path)).guid,
-        "modelIdentifier": "ship",
-        "unzipDirectory": fmpy.extract(str(path)),
-    }
-    functions = fmi2.fmi2CallbackFunctions()
-    functions.logger = fmi2.fmi2CallbackLoggerTYPE(write)
-    unit = fmi2.FMU2Slave(**given)
-    unit.instantiate(callbacks=functions)
-    unit.setupExperiment()
-    another = fmi2.FMU2Slave(**(given | {"guid": "another"}))
-    unit.refused = lambda: another.instantiate(callbacks=functions)
-    yield unit, known(path), messages
-    unit.freeInstance()
-
-
-WRONG = {
-    "unknown variable": (
-        lambda u, k: u.setReal([999], [0.0]),
-        "expected 0 to .*got 999",
-    ),
-    "no number": (
-        lambda u, k: u.setReal([k["rudder"].valueReference], [np.nan]),
-        "rudder: expected a finite number, got",
-    ),
-    "time": (
-        lambda u, k: u.setReal([0], [1.0]),
-        "time: expected to be set by the steps",
-    ),
-    "backwards": (lambda u, k: u.doStep(0.0, -1.0), "expected a finite time.*got 0 s"),
-    "integer": (lambda u, k: u.getInteger([1]), "fmi2GetInteger: this FMU does not"),
-    "another": (lambda u, k: u.refused(), "token: expected .*got another; the model"),
-    "lost": (
-        lambda u, k: (u.setReal([k["u"].valueReference], [900.0]), u.doStep(0.0, 1.0)),
-        "the ship has run away or capsized",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", WRONG)
-def test_why_a_function_of_an_fmu_fails_is_logged(name, logged):
-    unit, variables, messages = logged
-    call, reason = WRONG[name]
-    messages.clear()
-    with pytest.raises(Exception):  # noqa: B017, PT011 - FMPy's, of several kinds
-        call(unit, variables)
-    ((status, category, message),) = messages
-    assert (status, category) == (3, "logStatusError")
-    assert re.search(reason, message)
-
-
-OSP = Path(__file__).parents[2] / "examples" / "osp" / "OspSystemStructure.xml"
-
-
-@pytest.fixture
-def osp(tmp_path):
-    """Folder of the example of the Open Simulation Platform with its FMUs."""
-    pilot = autopilot_source(LQ.from_model(MARINER), "pilot")
-    write_fmu(ship_source(MARINER, "ship"), tmp_path / "ship.fmu")
-    write_fmu(pilot, tmp_path / "pilot.fmu")
-    shutil.copy(OSP, tmp_path)
-    return tmp_path
-
-
-def test_the_osp_example_names_variables_that_there_are(osp):
-    space = {"": "http://opensimulationplatform.com/MSMI/OSPSystemStructure"}
-    structure = ElementTree.parse(osp / OSP.name)
-    variables = {}
-    for one in structure.iterfind(".//Simulator", space):
-        variables[one.get("name")] = known(osp / one.get("source"))
-        for value in one.iterfind(".//InitialValue", space):
-            assert value.get("variable") in variables[one.get("name")]
-    connected = list(structure.iterfind(".//VariableConnection", space))
-    for output, given in connected:
-        units = set()
-        for end, causality in ((output, "output"), (given, "input")):
-            variable = variables[end.get("simulator")][end.get("name")]
-            assert variable.causality == causality
-            units.add(variable.unit)
-        assert len(units) == 1
-    assert {one.get("name") for _, one in connected} == {
-        *(name for name in ("heading", "yaw_rate", "sway", "rudder"))
-    }
-
-
-def test_libcosim_runs_the_osp_example(osp):
-    execution_module = pytest.importorskip("libcosimpy.CosimExecution")
-    observer_module = pytest.importorskip("libcosimpy.CosimObserver")
-    execution = execution_module.CosimExecution.from_osp_config_file(str(osp))
-    observer = observer_module.CosimObserver.create_last_value()
-    execution.add_observer(observer)
-    assert execution.simulate_until(300 * 10**9)
-    ship = execution.slave_index_from_instance_name("ship")
-    names = {
-        one.name.decode(): one.reference for one in execution.slave_variables(ship)
-    }
-    (heading,) = observer.last_real_values(ship, [names["psi"]])
-    assert heading == pytest.approx(0.5, abs=0.02)
-
-
-@pytest.mark.parametrize("name", [signal.SIGTERM, signal.SIGKILL])
-def test_a_killed_export_leaves_nothing_half_written(name, tmp_path):
-    compiler = tmp_path / "slow"
-    compiler.write_text("#!/bin/sh\nsleep 20\n")
-    compiler.chmod(0o700)
-    out = tmp_path / "out"
-    out.mkdir()
-    command = ["export", "mariner", "--fmu", f"{out}/ship.fmu", "--name", "ship"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "agents.cli", *command],
-        env={**os.environ, "CC": str(compiler)},
-        start_new_session=True,
-    )
-    while not list(out.glob(".*/ship.c")):
-        assert process.poll() is None
-        time.sleep(0.05)
-    process.send_signal(name)
-    code = process.wait()
-    left = list(out.iterdir())
-    if name == signal.SIGTERM:
-        assert (code, left) == (130, [])
-    else:
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, name)  # its compiler
-        assert all(one.name.endswith(".draft") for one in left)
-    write_fmu(ship_source(MARINER, "ship"), out / "ship.fmu")
-    assert [one.name for one in out.iterdir()] == ["ship.fmu"]
-
-
 @pytest.mark.parametrize(
     ("name", "better"),
     [("fmu", "fmu.fmu"), ("a.FMU", "a.fmu"), ("b.c", "b.fmu")],
@@ -315,13 +159,3 @@ def test_an_fmu_of_another_ending_is_refused_with_a_better_name(name, better, tm
     with pytest.raises(InputError, match=f"ends in .fmu.*; call it {better}$"):
         write_fmu(autopilot_source(PILOTS["lq"], "lq"), tmp_path / name)
     assert not list(tmp_path.iterdir())
-
-
-def test_names_of_c_that_an_fmu_has_itself(tmp_path):
-    pilot = autopilot_source(PILOTS["lq"], "fmu")
-    write_fmu(pilot, tmp_path / "fmu.fmu")
-    assert validation.validate_fmu(str(tmp_path / "fmu.fmu")) == []
-    with pytest.raises(
-        InputError, match="name: expected another than that of a header"
-    ):
-        write_fmu(autopilot_source(PILOTS["lq"], "fmi2Functions"), tmp_path / "a.fmu")

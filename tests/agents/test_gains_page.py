@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from agents import LQ, PID, PreviewLQ, WheelOver
+from agents import LQ, PID, WheelOver
 from shipgym.tasks.task import Task
 from tests.agents.bridge import Bridge
 from tests.agents.policies import MARINER
@@ -96,15 +96,6 @@ def test_every_field_is_described(design):
     assert {*content, *content["gains"], *content["margins"], "dt"} <= described
 
 
-def between(x, points, values):
-    """On straight lines, that of the nearest beyond them."""
-    k = max(j for j, point in enumerate(points) if point <= max(x, points[0]))
-    if k == len(points) - 1:
-        return values[-1]
-    share = (max(x, points[0]) - points[k]) / (points[k + 1] - points[k])
-    return values[k] + share * (values[k + 1] - values[k])
-
-
 def wrap(angle):
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
@@ -170,123 +161,3 @@ def test_wheel_over_is_what_the_page_says():
         assert bridge.step(given) == pytest.approx(
             max(-limit, min(limit, order)), abs=1e-9
         )
-
-
-class SeenCurrent:
-    """The current by steps 1 to 4 of the page."""
-
-    def __init__(self, gains):
-        self.gains, self.before = gains, None
-        self.ahead = self.aside = 0.0
-        self.is_known = False
-
-    def see(self, given):
-        gains, side = self.gains, 0.0
-        off = wrap(given["set_point"] - given["heading"])
-        over = wrap(given["course"] - given["set_point"])
-        x = given["surge"] * math.cos(off) + given["sway"] * math.sin(off)
-        y = given["sway"] * math.cos(off) - given["surge"] * math.sin(off)
-        distance, angle = given["next_turn_distance"], given["next_turn_angle"]
-        passed, turned = 0.0, 0.0
-        first = self.before is None
-        if not first:
-            was, angle_before = self.before
-            side = math.copysign(1.0, angle_before)
-            swept = angle_before - angle
-            arc = side * swept * (gains["path_radius"] - side * given["cross_track"])
-            same_side = angle * angle_before > 0.0
-            last = angle == angle_before == 0.0
-            on_arc = distance <= 0.0 and same_side and side * swept > 0.0
-            if on_arc and arc < 2.0 * gains["service_speed"] * gains["interval"]:
-                turned = swept
-                passed = arc if was <= 0.0 else 0.0
-            elif distance > 0.0 and (last or (same_side and abs(swept) < 0.001)):
-                passed = was - distance if was < gains["sight"] else 0.0
-            elif was <= 0.0:
-                turned = angle_before
-        self.turn(turned)
-        self.before = distance, angle
-
-        speed = passed / gains["interval"]
-        along = abs(over) < 1.2
-        seen = along and 0.2 < speed / gains["service_speed"] < 2.0
-        v = speed if seen else x + self.ahead
-        most = 2.0 * gains["service_speed"]
-        ahead = max(-most, min(most, v - x))
-        aside = max(-most, min(most, v * math.tan(over) - y)) if along else self.aside
-        share = gains["current_update"]
-        if first or (seen and not self.is_known):
-            share = 1.0
-        self.is_known = self.is_known or seen
-        self.ahead += share * (ahead - self.ahead)
-        self.aside += share * (aside - self.aside)
-
-    def turn(self, angle):
-        cosine, sine = math.cos(angle), math.sin(angle)
-        self.ahead, self.aside = (
-            self.ahead * cosine + self.aside * sine,
-            self.aside * cosine - self.ahead * sine,
-        )
-
-
-def weighed_course(given, gains):
-    """The course by step 5 of the page."""
-    knots = gains["reach"] * np.array([0.0, 0.1, 0.2, 0.3, 0.6, 1.0])
-    weights = [*[gains[f"weight_{number}"] for number in range(5)], 0.0]
-
-    def summed(to):
-        points = np.append(knots[knots < to], to)
-        return np.trapezoid(np.interp(points, knots, weights), points)
-
-    course = -math.atan(given["cross_track"] / gains["lookahead"])
-    for one in ("next", "second"):
-        angle = given[f"{one}_turn_angle"]
-        begin = max(0.0, given[f"{one}_turn_distance"])
-        end = begin + gains["path_radius"] * abs(angle)
-        turned = (summed(end) - summed(begin)) / gains["path_radius"]
-        course += math.copysign(turned, angle)
-    return course
-
-
-def test_lq_with_preview_is_what_the_page_says():
-    agent = PreviewLQ.from_model(MARINER, task=Task.of("PathFollowing"))
-    random = np.random.default_rng(1)
-    bridge, gains, integral = Bridge(agent), agent.gains, 0.0
-    helm = json.loads(json.dumps(agent.to_dict()))["autopilot"]
-    of, neutral, limit = helm["gains"], helm["neutral_rudder"], MARINER.steering.limit
-    current = SeenCurrent(gains)
-    step_m = 7.0 * gains["interval"]
-    for step in range(300):
-        given = {name: random.normal(0.0, 0.05) for name in bridge.inputs}
-        to_go = 600.0 - step_m * step  # to the turn, and along it
-        left = max(0.0, 1.0 - max(0.0, -to_go) / gains["path_radius"])
-        if left == 0.0:  # behind it, the next one is to the other side
-            to_go, left = to_go + 2500.0, -0.5
-        if step >= 200:  # the last leg
-            to_go, left = 9000.0 - step_m * step, 0.0
-        given |= {
-            "surge": 7.5 + given["surge"],
-            "cross_track": 1000.0 * given["cross_track"],
-            "next_turn_distance": to_go,
-            "next_turn_angle": left,
-            "second_turn_distance": to_go + 900.0,
-            "second_turn_angle": -0.5,
-        }
-        current.see(given)
-        course = weighed_course(given, gains)
-        across = current.aside * math.cos(course) - current.ahead * math.sin(course)
-        speed = max(given["surge"], 0.25 * gains["service_speed"])
-        crab = math.asin(max(-0.8, min(0.8, across / speed)))
-        off = given["set_point"] - given["heading"]
-        error = wrap(off + course - gains["crab_share"] * crab)
-        if step and abs(error) <= math.radians(10.0):
-            integral += error * helm["design"]["dt"]
-
-        order = neutral + of["heading_error"] * error
-        order += of["heading_error_integral"] * integral
-        order += of["yaw_rate"] * given["yaw_rate"]
-        order += of["sway"] * (given["sway"] - helm["neutral_sway"])
-        order += of["rudder"] * (given["rudder"] - neutral)
-        within = max(-limit, min(limit, order))
-        assert bridge.step(given) == pytest.approx(within, abs=1e-9)
-    assert current.is_known

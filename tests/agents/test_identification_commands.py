@@ -3,7 +3,6 @@ the command line."""
 
 import json
 import re
-from pathlib import Path
 
 import document_options
 import pytest
@@ -104,87 +103,6 @@ def test_a_wrong_option_exits_with_2_and_is_named(ship, line, said, tmp_path):
     assert re.search(said, answer.stderr)
     assert answer.stderr.count("\n") == 1
     assert not (tmp_path / "out").exists()
-
-
-def test_the_command_line_goes_before_the_ship_file(demo):
-    ship = ShipFile.load(demo)
-    given = {
-        "method": "abc-lssvr",
-        "C": None,
-        "seed": 3,
-        "method.bounds": [1, 1e6],
-        "objective": "k-fold",
-    }
-    assert identification_settings(ship, given) == {
-        "structure": "abkowitz",
-        "method": "abc-lssvr",
-        "method.seed": 3,
-        "method.bounds": [1, 1e6],
-        "method.objective": "k-fold",
-    }
-
-
-def test_a_reference_model_is_found_from_the_ship_file_s_folder(ship):
-    path = ship('structure = "grey-box"', 'reference_model = "own/ship.json"')
-    chosen = identification_settings(ShipFile.load(path), {})
-    assert Path(chosen["reference_model"]) == path.parent / "own" / "ship.json"
-    assert "reference_model" not in identification_settings(
-        ShipFile.load(path), {"structure": "abkowitz"}
-    )
-
-
-@pytest.mark.parametrize(
-    ("lines", "given", "structure", "reference"),
-    [
-        (['structure = "grey-box"'], {}, "grey-box", "auto"),
-        (
-            ['structure = "grey-box"', 'reference_model = "tanker"'],
-            {},
-            "grey-box",
-            "tanker",
-        ),
-        (
-            ['structure = "grey-box"', 'reference_model = "tanker"'],
-            {"structure": "norrbin"},
-            "norrbin",
-            None,
-        ),
-        (
-            ['structure = "norrbin"', 'reference_model = "tanker"'],
-            {"structure": "nomoto", "reference_model": "mariner"},
-            "nomoto",
-            "mariner",
-        ),
-        (
-            ['structure = "norrbin"', 'reference_model = "tanker"'],
-            {"structure": None},
-            "norrbin",
-            "tanker",
-        ),
-        (['method = "rm-svm"', 'reference_model = "tanker"'], {}, "grey-box", "tanker"),
-        (['method = "rm-svm"'], {}, "auto", None),
-        (['method = "rm-svm"'], {"reference_model": "mariner"}, "grey-box", "mariner"),
-        (
-            [
-                'method = "rm-svm"',
-                'structure = "norrbin"',
-                'reference_model = "tanker"',
-            ],
-            {},
-            "norrbin",
-            "tanker",
-        ),
-        (['method = "ls"', 'reference_model = "tanker"'], {}, "auto", "tanker"),
-    ],
-)
-def test_a_reference_ship_belongs_to_the_structure_that_it_was_named_for(
-    ship, lines, given, structure, reference
-):
-    chosen = identification_settings(ShipFile.load(ship(*lines)), given)
-    assert (chosen["structure"], chosen.get("reference_model")) == (
-        structure,
-        reference,
-    )
 
 
 def test_what_is_wrong_with_trials_is_told_with_the_ship_file(demo):

@@ -1,6 +1,5 @@
 """From a log to a ship file and a page, in commands that say what they guessed."""
 
-import csv
 import shutil
 from pathlib import Path
 
@@ -98,24 +97,6 @@ def test_a_log_beside_others_that_cannot_be_read_is_told(log, monkeypatch, capsy
 
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "mariner" / "zigzag_10_10.csv"
-OF_EXAMPLE = {
-    "time_s": "t",
-    "compass_deg": "psi",
-    "gyro_deg_s": "r",
-    "rudder_deg": "delta",
-}
-
-
-def example(folder, edit=lambda row: row):
-    """The example's zigzag with names that tell no unit, its rows changed."""
-    with EXAMPLE.open() as file:
-        rows = [
-            edit({new: row[old] for old, new in OF_EXAMPLE.items()})
-            for row in csv.DictReader(file)
-        ]
-    lines = [",".join(rows[0]), *(",".join(row.values()) for row in rows)]
-    (folder / "run.csv").write_text("\n".join(lines))
-    return folder / "run.csv"
 
 
 def test_every_column_of_the_examples_log_is_recognised_in_its_unit(
@@ -158,38 +139,6 @@ def test_a_name_is_a_channels_where_its_unit_is_one_of_it(name, channel, unit):
     assert [(one.channel, one.unit) for one in found] == (
         [(channel, unit)] if channel else []
     )
-
-
-def test_the_unit_that_a_check_names_is_tried_and_written(log, monkeypatch, capsys):
-    example(log)
-    code, said = command(
-        monkeypatch, capsys, "new-ship", "run.csv", "--length", "160.9"
-    )
-    told = "unit by the check that refused deg/min (from its size, up to 0.637)"
-    assert (code, f"r: column 'r' in deg/s, {told}" in said) == (0, True), said
-    assert (
-        f'r = {{ column = "r", unit = "deg/s" }}   # {told}'
-        in (log / "ship.toml").read_text()
-    )
-    (trial,) = ShipFile.load(log / "ship.toml").trials()
-    assert np.abs(trial["r"]).max() == pytest.approx(np.radians(0.637))
-
-
-def test_blank_cells_are_filled_and_the_ship_file_says_so(log, monkeypatch, capsys):
-    example(
-        log,
-        lambda row: {**row, "psi": ""} if row["t"] in ("0.0", "20.0", "20.5") else row,
-    )
-    code, said = command(
-        monkeypatch, capsys, "new-ship", "run.csv", "--length", "160.9"
-    )
-    assert (code, 'repair = "interpolate", without which a log is refused' in said) == (
-        0,
-        True,
-    ), said
-    assert "2 missing values of psi were filled in" in said
-    (trial,) = ShipFile.load(log / "ship.toml").trials()
-    assert dict(trial.repaired) == {"psi": 2}
 
 
 def test_a_log_without_known_names_gives_a_ship_file_to_complete(

@@ -55,13 +55,6 @@ def test_a_delay_beyond_the_margin_makes_the_loop_unstable():
     assert pole_with_delay(int(np.ceil(delay))) > 1.0
 
 
-@pytest.mark.parametrize("kind", [PID, LQ, LQG])
-def test_the_loop_of_a_law_is_what_its_margins_are_of(kind):
-    controller = kind.from_model(MARINER)
-    ship = sample_ship(MARINER, controller.design["dt"])
-    assert controller.loop().margins(ship, "it") == controller.margins
-
-
 RUDDER_COEFFICIENTS = ("Y_d", "Y_ud", "Y_uud", "N_d", "N_ud", "N_uud")
 
 

@@ -5,13 +5,8 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from agents import LQ, PID, sail
+from agents import LQ, PID
 from agents.jobs import JobEngine
-from agents.verification.index_uncertainty import (
-    nominal_runs,
-    sail_draws,
-    uncertainty_of,
-)
 from agents.verification.monte_carlo import monte_carlo
 from shipgym import InputError, load_model
 
@@ -76,19 +71,6 @@ def test_two_workers_give_the_same_and_what_they_did_is_resumed(
         found,
     )
     assert told == [DRAWS]
-
-
-def test_jobs_change_nothing_in_what_is_sailed(found, ship, pilots):
-    drawn = ship.sample(DRAWS, SEED)
-    together = sail(pilots[1], drawn, seeds=SEED + np.arange(DRAWS))
-    np.testing.assert_array_equal(found.episodes[1].cost, together.cost)
-    whole = uncertainty_of(ship, nominal_runs(ship), sail_draws(ship, drawn))
-    for name, criterion in whole.criteria.items():
-        assert criterion.to_dict() == found.manoeuvres.criteria[name].to_dict()
-    for one, other in zip(
-        whole.circle_paths, found.manoeuvres.circle_paths, strict=True
-    ):
-        np.testing.assert_array_equal(one, other)
 
 
 def test_wrong_arguments(ship, pilots):

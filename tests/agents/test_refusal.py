@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from agents import PID
-from agents.identifying import identification_settings, identify_ship
 from agents.rollouts.course_keeping import sail
 from agents.verification.chain import or_simpler, write_agents, write_findings
 from agents.verification.closed_loop import (
@@ -25,8 +24,7 @@ from agents.verification.refusal import (
     simpler_structures,
     why_refused,
 )
-from identification.design.experiment import advise
-from shipgym import InputError, ShipFile, load_model
+from shipgym import InputError, load_model
 
 
 @pytest.fixture
@@ -90,30 +88,11 @@ def test_the_next_best_structures_with_fewer_coefficients_are_named():
     assert simpler_structures(ranking, "nomoto") == []
 
 
-def test_the_reason_why_a_model_is_unstable_stands_in_the_metrics_too(unstable_ship):
-    ship = ShipFile.load(unstable_ship)
-    result = identify_ship(ship, identification_settings(ship, {}))
-    assert not result.stable
-    assert result.metrics["instability"].startswith("runs away: ")
-    assert (
-        "deg" in result.metrics["instability"]
-        or "trial" in result.metrics["instability"]
-    )
-
-
 def test_an_unstable_design_names_the_options_to_change():
     with pytest.raises(
         InputError, match=r"shorter control interval dt, and a lower frequency \(PID\)"
     ):
         PID.from_model(load_model("mariner"), frequency=0.01, damping=20.0, dt=30.0)
-
-
-def test_advice_is_not_about_a_coefficient_near_zero(fit):
-    used = [trial for trial in fit.trials if trial.use == "fit"]
-    tiny = replace(fit.model, coefficients=fit.coefficients | {"N_0u": 1e-12})
-    found = advise(tiny, used, {"zigzag": lambda ship: used[0]})
-    assert max(found.before, key=lambda name: found.before[name]) == "N_0u"
-    assert found.coefficient != "N_0u"
 
 
 def test_an_autopilot_may_lose_one_model_in_twenty_of_those_that_count():

@@ -131,43 +131,6 @@ def test_a_page_shows_what_was_recorded_in_the_units_that_are_read(shown):
     assert "time limit" in page
 
 
-def test_what_was_not_recorded_or_is_calm_is_not_shown(shown):
-    calm = {**episode().states, "wind_speed": np.zeros(STEPS + 1)}
-    for name in ("u", "current_east"):
-        del calm[name]
-    panels = " ".join(histories(shown(states=calm)))
-    for word in ("speed", "wind", "current", "heel"):
-        assert word not in panels
-
-
-@pytest.mark.parametrize("first", [-0.1, 7.0, 0.0, 3.0])
-def test_headings_start_within_a_turn_and_go_on_without_a_jump(shown, first):
-    known = episode().states
-    heading = known["psi"] + first
-    wrapped = np.arctan2(np.sin(heading), np.cos(heading))
-    order = np.full(STEPS + 1, first)
-    found = histories(shown(states={**known, "psi": wrapped, "set_point": order}))
-    (begin, end), _ = found["heading, deg"]
-    turned = np.degrees(0.002 * END)
-    assert begin == pytest.approx(np.degrees(first) % 360.0, abs=1e-3)
-    assert end - begin == pytest.approx(turned, abs=1e-3)
-    ((_, error),) = found["heading error, deg"]  # the short way round
-    assert error == pytest.approx(-turned, abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("flags", "words"),
-    [
-        ({"truncated": False}, "cut off"),
-        ({"terminated": True, "success": True}, "success"),
-        ({"terminated": True, "success": False}, "terminated"),
-        ({"truncated": True, "success": False}, "time limit, no success"),
-    ],
-)
-def test_how_an_episode_ended_is_told(shown, flags, words):
-    assert f"<td>{words}</td>" in shown(**flags)
-
-
 def test_the_ship_moves_through_the_frames_to_its_end(shown):
     known = episode()
     page = shown(
@@ -269,31 +232,7 @@ def test_a_wrong_file_exits_with_2_one_message_and_no_page(recorded, text, said)
     assert not recorded.with_name("replay.html").exists()
 
 
-@pytest.mark.parametrize(
-    ("out", "said"),
-    [
-        ("replay.png", "expected a file that ends in .html"),
-        ("none/replay.html", "does not exist"),
-        (".html", ".html"),
-    ],
-)
-def test_a_page_that_cannot_be_written_exits_with_2(recorded, out, said):
-    answer = shipgym(recorded, "--out", recorded.parent / out)
-    assert answer.exit_code == 2
-    assert said in answer.stderr
-
-
 def test_no_episode_is_an_error(tmp_path):
     assert shipgym("--out", tmp_path / "replay.html").exit_code == 2
     with pytest.raises(InputError, match="expected at least one"):
         write_replay([], tmp_path / "replay.html")
-
-
-def test_runs_are_called_by_what_tells_their_files_apart(tmp_path):
-    paths = [tmp_path / name / "episode-00000.json" for name in ("lq", "pid")]
-    for path in paths:
-        path.parent.mkdir()
-        episode().save(path)
-    write_replay(paths, tmp_path / "replay.html")
-    rows = re.findall(r"<tr><td>(.*?)</td>", (tmp_path / "replay.html").read_text())
-    assert rows == ["lq/episode-00000", "pid/episode-00000"]

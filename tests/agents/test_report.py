@@ -1,22 +1,16 @@
 import hashlib
 import re
-import sys
 from dataclasses import replace
 from html.parser import HTMLParser
 from importlib.resources import files
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from agents.cli.autopilot import print_autopilot
-from agents.cli.standard_trials import StandardTrials
-from agents.cli.trials_page import write_page
-from agents.output import check_page
 from agents.verification.page import write_report
-from shipgym import InputError, Trial, load_model
-from shipgym.manoeuvres import IndexInterval, standard_manoeuvres
-from shipgym.pages import environment, number, percent
+from shipgym import Trial
+from shipgym.pages import environment, percent
 from shipgym.plots import graph_objects
 from tests.agents.browser import COMMAND, Browser
 from tests.agents.conftest import DRAWS
@@ -138,13 +132,6 @@ def test_the_chain_prints_its_tables(chain, capsys):
     assert "report: report.html" in printed
 
 
-def test_every_figure_has_a_caption_and_a_place(source):
-    names = re.findall(r'Plotly.newPlot\("plot-([\w-]+)"', source)
-    assert len(names) == len(set(names)) == source.count("<figcaption>") == 7
-    for name in names:
-        assert f'id="plot-{name}"' in source
-
-
 @pytest.mark.skipif(COMMAND is None, reason="no chromium is installed")
 def test_a_browser_without_network_draws_every_figure_also_for_paper(chain):
     address = (chain[0] / "report.html").as_uri()
@@ -227,55 +214,12 @@ def test_hostile_names_of_ship_trials_and_autopilots_stay_text(chain, tmp_path):
     assert HOSTILE.upper() in " ".join(Page(source).text)
 
 
-def test_hostile_names_of_models_and_manoeuvres_stay_text(tmp_path):
-    name = f"zigzag {HOSTILE}"
-    zigzags = {
-        name: standard_manoeuvres(load_model("mariner"))["zigzag 20/20, port first"]
-    }
-    index = IndexInterval(1.0, np.empty(0), np.empty(0, dtype=bool))
-    found = StandardTrials(
-        {"zigzags": zigzags}, {}, {name: {"period_s": index}}, {}, {name: HOSTILE}, 0
-    )
-    write_page(
-        replace(load_model("mariner"), name=HOSTILE), found, tmp_path / "trials.html"
-    )
-    source = (tmp_path / "trials.html").read_text()
-    assert Page(source).scripts == 2
-    assert (
-        " ".join(Page(source).text).count(HOSTILE) == 5
-    )  # window, title, head, and why it was refused
-
-
-def test_a_page_that_cannot_be_drawn_is_refused_before_any_work(tmp_path, monkeypatch):
-    check_page(tmp_path / "trials.html", plots=True)
-    monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
-    with pytest.raises(InputError, match="plotly is not installed"):
-        check_page(tmp_path / "trials.html", plots=True)
-    check_page(tmp_path / "trials.html")
-
-
 def test_a_figure_cannot_end_the_script_it_stands_in():
     drawn = graph_objects().Figure(layout={"title": {"text": HOSTILE}, "height": 300})
     assert (
         shown('{{ parts.figure("plot", drawn, "") }}', drawn=drawn).count("</script>")
         == 1
     )
-
-
-@pytest.mark.parametrize(
-    ("value", "shown"),
-    [
-        (0.0012345, "0.00123"),
-        (-12.345, "\N{MINUS SIGN}12.3"),
-        (1234.5, "1234"),
-        (0.0, "0"),
-        (None, "\N{EN DASH}"),
-        (np.inf, "\N{EN DASH}"),
-        (1.2345e-6, "1.23 · 10⁻⁶"),
-    ],
-)
-def test_numbers_have_three_significant_digits(value, shown):
-    assert number(value) == shown
 
 
 @pytest.mark.parametrize(

@@ -2,16 +2,12 @@
 refused."""
 
 import json
-from dataclasses import fields
 
 import pytest
 
-from agents.suites.suite import load_suite
 from agents.training.plan import TrainingRequest, make_plan, training_options
 from agents.training.settings import (
-    ALGORITHMS,
     load_settings,
-    make_settings,
     read_settings_file,
 )
 from shipgym import InputError, Particulars
@@ -65,22 +61,6 @@ def test_a_value_comes_from_the_nearest_table():
     for asked in ({"environment": "paths"}, {"action": "ruder"}):
         with pytest.raises(InputError, match=f"{next(iter(asked))}: "):
             load_settings("ppo", **asked)
-
-
-@pytest.mark.parametrize("algorithm", ALGORITHMS)
-def test_every_setting_has_a_meaning_and_a_value_with_a_base_on_the_suite(algorithm):
-    for one in fields(ALGORITHMS[algorithm]):
-        assert one.metadata["meaning"].strip(), one.name
-    table = load_settings(algorithm).to_dict()
-    assert make_settings(algorithm, table).to_dict() == table
-    del table["total_steps"]
-    with pytest.raises(InputError, match=f"{algorithm}: field 'total_steps' is miss"):
-        make_settings(algorithm, table)
-    for task in load_suite().tasks:
-        where = (task.environment, task.name)
-        settings = load_settings(algorithm, *where, suite="shipgym-v1")
-        assert settings.base == "tuned"
-        assert settings.authority <= 1.0
 
 
 def test_the_command_goes_before_the_file_of_settings_and_that_before_tuned_ones(

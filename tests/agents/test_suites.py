@@ -1,6 +1,5 @@
 """Suites of tasks: shipped ones, a user's own, and what is refused with its field."""
 
-import json
 import shutil
 from pathlib import Path
 
@@ -66,12 +65,6 @@ def test_a_suite_is_read_task_by_task():
     assert rough.task.weather.name == "rough"
     assert suite.task("drift") is drift
     np.testing.assert_array_equal(calm.seeds, 1_000_000 + np.arange(100))
-
-
-def test_a_task_travels_as_json():
-    for task in (*parse_suite(TEXT, "mine").tasks, *parse_suite(SMALL, "mine").tasks):
-        content = json.loads(json.dumps(task.to_dict()))
-        assert BenchmarkTask.from_dict(content) == task
 
 
 @pytest.mark.parametrize(
@@ -240,24 +233,6 @@ def test_files_of_a_suite_lie_where_it_lies(tmp_path):
     (tmp_path / "other.toml").write_bytes(b"\xff\xfe")
     with pytest.raises(InputError, match=r"other.toml: expected UTF-8"):
         load_suite(tmp_path / "other.toml")
-
-
-@pytest.mark.parametrize(
-    ("text", "name", "options"),
-    [
-        ("course-keeping", "course-keeping", {}),
-        ("path-following", "path-following", {}),
-        ("shipgym/CourseKeeping-v0", "course-keeping", {}),
-        (
-            "shipgym/PathFollowingShaft-v0",
-            "path-following",
-            {"action": "rudder-shaft", "model": "tanker-tls-svm"},
-        ),
-        ("shipgym:shipgym/CourseKeeping-v0", "course-keeping", {}),
-    ],
-)
-def test_environments_have_short_names_and_ids(text, name, options):
-    assert read_environment(text) == (name, options)
 
 
 @pytest.mark.parametrize(

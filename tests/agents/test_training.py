@@ -179,26 +179,10 @@ def test_a_checkpoint_that_is_broken_or_of_another_run_is_refused(tmp_path):
             train(plan, tmp_path / "run", resume=True)
 
 
-def test_time_that_is_up_is_made_up_for(tmp_path):
-    stopped = train(tiny(), tmp_path, max_seconds=0.0)
-    finished = train(tiny(), tmp_path, resume=True)
-    assert (stopped.finished, stopped.steps) == (False, 0)
-    assert (finished.finished, finished.steps, finished.resumed_from) == (True, 768, 0)
-    assert stopped.seconds < finished.seconds
-
-
 def test_what_learns_from_nothing_does_not_begin_with_nothing():
     agent = make_agent(tiny("sac", base="none", seed=2), None)
     assert agent.actor.mu.weight.abs().max() > 0.0
     assert agent.seed == 2000
-
-
-def test_ships_that_learn_begin_one_after_another():
-    ships = make_ships(tiny(ships=20, n_steps=32, batch_size=64), None)
-    ships.reset()
-    still = np.zeros((20, 1), np.float32)
-    ended = np.array([ships.step(still)[2] for _ in range(60)])
-    assert (ended.sum(axis=1) == 1).all()  # of 20 ships with episodes of 20 steps
 
 
 def test_exploration_falls_to_what_is_asked():

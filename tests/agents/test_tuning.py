@@ -89,24 +89,6 @@ def test_better_settings_are_found_and_written_for_training(trainings, tmp_path)
     assert study.best_value == found.best.cost
 
 
-def test_an_interrupted_study_goes_on_with_the_trials_that_are_not_done(
-    trainings, tmp_path
-):
-    trainings[0] = 3
-    with pytest.raises(KeyboardInterrupt):
-        tune(plan(), tmp_path, 6)
-    trainings[0] = 3
-    assert len(tune(plan(), tmp_path, 6).trials) == 6
-    assert tune(plan(), tmp_path, 6).best.cost is not None  # nothing is trained again
-
-
-def test_settings_that_are_given_are_not_varied(trainings, tmp_path):
-    found = tune(plan(gamma=0.9), tmp_path, 5, fixed=("gamma", "batch_size"))
-    varied = set().union(*(trial.parameters for trial in found.trials))
-    assert "learning_rate" in varied
-    assert not {"gamma", "batch_size"} & varied
-
-
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_whatever_is_proposed_are_valid_settings(algorithm):
     settings = load_settings(algorithm)

@@ -7,15 +7,12 @@ import numpy as np
 import pytest
 
 from agents import WheelOver
-from agents.verification.chain import build_autopilot, stage
+from agents.verification.chain import build_autopilot
 from agents.verification.page import headline, is_certain
 from agents.verification.refusal import lost_track
 from agents.verification.result import track_metrics
 from agents.verification.tracks import keep_track, track_task
-from agents.verification.tuned import holds_draws, model_task
-from identification.progress import PROGRESS
-from shipgym import Current, InputError, Weather, load_model
-from shipgym.tasks.task import path_following_task
+from shipgym import InputError, load_model
 
 
 def track(largest, rms, arrived):
@@ -51,17 +48,6 @@ def test_the_first_ship_of_a_track_is_the_identified_one_and_the_others_are_draw
         40.0,
         False,
         0,
-    )
-
-
-def episodes(count=101):
-    numbers = np.arange(float(count))
-    return SimpleNamespace(
-        cost=numbers,
-        heading_rmse_deg=2.0 * numbers,
-        rudder_travel_deg_min=3.0 * numbers,
-        extrapolating=numbers / 100.0,
-        terminated=numbers > 97.0,
     )
 
 
@@ -169,23 +155,6 @@ def test_a_path_autopilot_that_does_not_arrive_on_the_identified_model_is_refuse
     )
 
 
-def test_a_stage_is_told_at_its_beginning_and_end_and_its_parts_in_between():
-    calls, outside = [], PROGRESS.get(None)
-    with stage(lambda *one: calls.append(one), "reading"):
-        assert calls == [("reading", 0, 1)]
-        PROGRESS.get()("part", 1, 3)
-    assert calls[1:] == [("part", 1, 3), ("reading", 1, 1)]
-    assert PROGRESS.get(None) is outside
-    calls.clear()
-    with (
-        pytest.raises(ValueError, match="lost"),
-        stage(lambda *one: calls.append(one), "it"),
-    ):
-        raise ValueError("lost")
-    assert calls == [("it", 0, 1)]
-    assert PROGRESS.get(None) is outside
-
-
 @pytest.mark.parametrize(
     ("given", "message"),
     [
@@ -198,16 +167,3 @@ def test_what_is_wrong_is_said_before_a_file_is_read(given, message, tmp_path):
     with pytest.raises(InputError, match=message):
         build_autopilot("no such ship.toml", tmp_path / "out", **given)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_search_leaves_models_drawn_that_a_design_loses():
-    ship = load_model("mariner")
-
-    def sailed(current):
-        task = path_following_task(sea=Weather(current=Current(current, 90.0)))
-        return model_task("path-following", ship, task)
-
-    calm = sailed(0.0)
-    assert holds_draws("wheel-over", calm, calm)
-    swept_away = sailed(9.0)  # faster than the ship
-    assert not holds_draws("wheel-over", swept_away, calm)
