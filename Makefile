@@ -31,7 +31,7 @@ COMPILED = -m "compiled or not interpreted" --ignore=tests/test_site.py tests/te
 
 test: lint type
 	NUMBA_DISABLE_JIT=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 -m "interpreted and not compiled" $(INTERPRETED)
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(COMPILED)
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --durations=25 $(COMPILED)
 
 lint: $(VENV)/dev-installed
 	$(BIN)/ruff format --check .
