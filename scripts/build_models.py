@@ -27,7 +27,6 @@ import shipgym
 from identification import IdentificationResult, KernelResidual, identify
 from shipgym import ShipModel, Trial
 from shipgym.manoeuvres import (
-    shaft_speed_steps,
     turning_circle,
     turning_indices,
     zigzag,
@@ -137,14 +136,31 @@ def sea_trials(
     duration = ZIGZAG_LENGTHS * travel
     runs = _zigzags(name, (*IMO_ZIGZAGS, *(HARD.get(name, ()) if hard else ())))
     for k, rudder in enumerate(SHAFT_STEPS_DEG if shaft_steps else ()):
-        steps = shaft_speed_steps(
-            ship, seed=7 + k, rudder_deg=rudder, duration=duration, dt=STEP
-        )
+        steps = _shaft_speed_steps(ship, 7 + k, rudder, duration)
         runs.append(steps.with_(name=f"shaft speed steps at {rudder} deg"))
     for rudder in TURNS_DEG if turns else ():
         turn = turning_circle(ship, rudder, TURN_LENGTHS * travel, STEP)
         runs.append(turn.with_(name=f"turn at {rudder} deg"))
     return _logged(runs, 100)
+
+
+def _shaft_speed_steps(
+    ship: ShipModel, seed: int, rudder_deg: float, duration: float
+) -> Trial:
+    """Steps of the ordered shaft speed, half to 1.1 of that of service.
+
+    Each is held for 5 to 15 times the time to travel one ship length.
+    """
+    travel = ship.travel_time
+    times = STEP * np.arange(round(duration / STEP))
+    most = int(times[-1] / (5.0 * travel)) + 2
+    rng = np.random.default_rng(seed)
+    ends = np.cumsum(rng.uniform(5.0 * travel, 15.0 * travel, most))
+    ratios = rng.uniform(0.5, 1.1, most)
+    place = np.searchsorted(ends, times, side="right")
+    rudder = np.full(len(times), np.radians(rudder_deg))
+    commands = np.stack([rudder, ship.service_shaft_speed * ratios[place]], axis=-1)
+    return ship.simulate(commands, STEP).with_(kind="random")
 
 
 def _zigzags(

@@ -1,6 +1,6 @@
 """Coverage of the intervals of everything that `auto` can choose, on foreign ships.
 
-    python scripts/certainty.py [--out FILE] [--quick | --new]
+    python scripts/certainty.py [--out FILE] [--quick]
     python scripts/certainty.py --out FILE --table
 
 prints the tables of docs/certainty.md. Each ship of tests/ships/foreign.py is
@@ -57,15 +57,13 @@ from shipgym.manoeuvres.intervals import (
     own_indices,
 )
 from shipgym.manoeuvres.registry import standard_time
-from tests.ships.foreign import FOREIGN, KNOWN, SECOND_FIVE
+from tests.ships.foreign import FOREIGN
 
 AUTO = "auto"
 NORRBIN = "norrbin"
 IN_RANGE, BEYOND = "in range", "beyond"
 PARTS = (IN_RANGE, BEYOND)
 KINDS = ("indices", "motion")
-#: The ships that the error of hard turns was worked out on.
-WORKED_ON = [name for name in KNOWN if name not in ("stable-heavy", "lively-light")]
 QUICK = ("naval-vessel", "ferry", "kcs")
 Key = tuple[str, str]  # a manoeuvre and the name of an index
 
@@ -316,13 +314,12 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("certainty.jsonl"))
     parser.add_argument("--seeds", type=int, default=1, help="of the noise")
     parser.add_argument("--draws", type=int, default=60, help="models drawn")
-    parser.add_argument("--ships", type=ship_names, default=",".join(WORKED_ON))
-    parser.add_argument("--new", action="store_true", help="the five that came second")
+    parser.add_argument("--ships", type=ship_names, default=list(FOREIGN))
     parser.add_argument("--structures", default=",".join((*STRUCTURES, AUTO)))
     parser.add_argument("--quick", action="store_true", help="three ships, 30 draws")
     parser.add_argument("--table", action="store_true", help="of FILE, nothing is run")
     given = parser.parse_args()
-    ships = list(SECOND_FIVE) if given.new else given.ships
+    ships = given.ships
     draws = given.draws
     if given.quick:
         ships, draws = list(QUICK), 30

@@ -11,7 +11,6 @@ from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 from shipgym.manoeuvres import Criterion, IndexInterval, Manoeuvre
 from shipgym.manoeuvres.imo import imo_criteria
 from shipgym.manoeuvres.intervals import intervals_of
-from shipgym.manoeuvres.spirals import Spiral
 from shipgym.manoeuvres.standard import families_of
 from shipgym.models import ShipModel
 from shipgym.trials.trial import Trial
@@ -41,7 +40,7 @@ class StandardTrials:
     """
 
     families: dict[str, dict[str, Manoeuvre]]
-    runs: dict[str, Trial | Spiral]
+    runs: dict[str, Trial]
     indices: dict[str, dict[str, IndexInterval]]
     criteria: dict[str, Criterion]
     refused: dict[str, str]
@@ -120,7 +119,7 @@ def standard_trials(
 class _Nominal(NamedTuple):
     """Manoeuvres of the model itself: runs, indices, and why there are none."""
 
-    runs: dict[str, Trial | Spiral]
+    runs: dict[str, Trial]
     indices: dict[str, dict[str, float | None]]
     refused: dict[str, str]
 

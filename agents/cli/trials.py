@@ -30,8 +30,8 @@ def trials_command(
 ) -> None:
     """Simulate the standard manoeuvres of a model. Assesses them by the IMO criteria.
 
-    Zigzags, turning circles, spirals, pull-outs, and, with a shaft, stops and an
-    acceleration. The indices of an identified model come with their 95 % intervals.
+    Zigzags, turning circles, and, with a shaft, stops. The indices of an identified
+    model come with their 95 % intervals.
     """
     from agents.cli.standard_trials import standard_trials
     from agents.cli.terminal import answer, progress_bars

@@ -6,11 +6,10 @@ from typing import Any
 from agents.cli.standard_trials import StandardTrials
 from agents.verification.figures import criterion_name
 from shipgym.files import write_text
-from shipgym.manoeuvres.spirals import Spiral
 from shipgym.manoeuvres.standard import FAMILIES, Manoeuvre
 from shipgym.models import ShipModel
 from shipgym.pages import render
-from shipgym.plots import history_figure, manoeuvre_figure, path_figure, pull_out_figure
+from shipgym.plots import history_figure, manoeuvre_figure, path_figure
 from shipgym.trials.trial import Trial
 
 #: Name in the page, plotly figure, and caption.
@@ -62,30 +61,18 @@ def _figures(
 ) -> list[Figure]:
     """All figures of one family of manoeuvres."""
     runs = {key: run for key, run in trials.runs.items() if key in family}
-    simulated = {key: run for key, run in runs.items() if isinstance(run, Trial)}
-    if name == "pull-outs" and simulated:
-        first, *_ = simulated
-        caption = family[first].caption
-        figures = [(name, pull_out_figure(simulated), caption)]
-    else:
-        figures = _manoeuvre_figures(name, family, runs)
-        if simulated:
-            caption = "Paths from above, north up, in metres."
-            figures.append((f"{name}-paths", path_figure(simulated), caption))
-
-    histories = simulated
-    if not histories:
-        spirals = {key: run for key, run in runs.items() if isinstance(run, Spiral)}
-        histories = {key: run.trial for key, run in spirals.items()}
-    if histories:
-        figure = history_figure(histories, ("psi", "delta", "r", "speed", "drift"))
+    figures = _manoeuvre_figures(name, family, runs)
+    if runs:
+        caption = "Paths from above, north up, in metres."
+        figures.append((f"{name}-paths", path_figure(runs), caption))
+        figure = history_figure(runs, ("psi", "delta", "r", "speed", "drift"))
         caption = "Time histories: heading, rudder, yaw rate, speed and drift angle."
         figures.append((f"{name}-histories", figure, caption))
     return figures
 
 
 def _manoeuvre_figures(
-    name: str, family: dict[str, Manoeuvre], runs: dict[str, Trial | Spiral]
+    name: str, family: dict[str, Manoeuvre], runs: dict[str, Trial]
 ) -> list[Figure]:
     """A figure of each manoeuvre."""
     figures = []

@@ -1,16 +1,8 @@
 from .criteria import Criterion as Criterion
 from .excitation import prbs_rudder as prbs_rudder
-from .excitation import shaft_speed_steps as shaft_speed_steps
 from .imo import imo_assessment as imo_assessment
 from .intervals import IndexInterval as IndexInterval
 from .intervals import index_intervals as index_intervals
-from .spirals import PullOutIndices as PullOutIndices
-from .spirals import Spiral as Spiral
-from .spirals import SpiralIndices as SpiralIndices
-from .spirals import direct_spiral as direct_spiral
-from .spirals import pull_out as pull_out
-from .spirals import pull_out_indices as pull_out_indices
-from .spirals import spiral_indices as spiral_indices
 from .standard import Manoeuvre as Manoeuvre
 from .standard import register_manoeuvre as register_manoeuvre
 from .standard import standard_manoeuvres as standard_manoeuvres

@@ -171,16 +171,6 @@ def reached(values: Floats, threshold: float, other: Floats) -> float | None:
     return float(at)
 
 
-def turning_rudder(rudder_deg: float, limit: float, hint: str = "") -> float:
-    """Rudder angle from degrees, rad; InputError for 0 or one beyond the limit."""
-    angle = check_number(
-        rudder_deg, "rudder_deg", at_least=-limit, at_most=limit, hint=hint
-    )
-    if angle == 0.0:
-        raise InputError("rudder_deg: expected an angle that turns the ship, got 0")
-    return float(np.radians(angle))
-
-
 def number_of_steps(duration: float, dt: float) -> int:
     """Steps of dt in a duration, both s, checked."""
     check_number(dt, "dt", above=0.0)

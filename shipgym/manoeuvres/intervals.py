@@ -244,8 +244,6 @@ def is_size(index: str) -> bool:
         "overshoot_2_deg",
         "initial_turning_lengths",
         "period_s",
-        "loop_width_deg",
-        "loop_height_deg_s",
         "track_reach_lengths",
         "time_s",
     )

@@ -26,14 +26,13 @@ SIDES = (("starboard", 1.0), ("port", -1.0))
 class Manoeuvre:
     """One manoeuvre with all its settings, and the indices that are read from it."""
 
-    # from a ship to the trial (to the spiral, for spirals)
-    sail: Callable[[ShipModel], Any]
-    indices: Callable[[Any], Any]  # from the run to its indices
+    sail: Callable[[ShipModel], Trial]
+    indices: Callable[[Trial], Any]  # from the trial to its indices
     outcome: type  # the dataclass of its indices, units in the names of its fields
     caption: str = ""  # caption of its figure
     # from the run to its figure; by default one for its kind
     # (`shipgym.plots.manoeuvre_figure`)
-    figure: Callable[[Any], Figure] | None = None
+    figure: Callable[[Trial], Figure] | None = None
 
     @property
     def no_indices(self) -> dict[str, float | None]:
@@ -43,8 +42,7 @@ class Manoeuvre:
     def evaluate(self, model: ShipModel) -> Any:
         """Indices of a ship; UnstableModelError for motions that no ship can have."""
         sailed = self.sail(model)
-        if isinstance(sailed, Trial):
-            check_physical(model, sailed)
+        check_physical(model, sailed)
         return self.indices(sailed)
 
 
@@ -155,10 +153,9 @@ def standard_manoeuvres(
     Returns
     -------
     dict of str to Manoeuvre
-        Zigzags 10/10 and 20/20, turning circles with full rudder and pull-outs, each to
-        both sides; a direct spiral; with a shaft an inertia stop, and a crash stop
-        where her equations hold for a shaft astern; and what was registered besides
-        (`register_manoeuvre`).
+        Zigzags 10/10 and 20/20 and turning circles with full rudder, each to both
+        sides; with a shaft an inertia stop, and a crash stop where her equations hold
+        for a shaft astern; and what was registered besides (`register_manoeuvre`).
     """
     found = dict[str, Manoeuvre]()
     for family in families_of(model, water_depth).values():

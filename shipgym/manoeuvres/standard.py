@@ -11,7 +11,6 @@ from shipgym.manoeuvres.registry import (
     register_manoeuvre,
     standard_manoeuvres,
 )
-from shipgym.manoeuvres.spirals import standard_pull_outs, standard_spirals
 from shipgym.manoeuvres.stopping import standard_stops
 from shipgym.manoeuvres.turning import standard_circles
 from shipgym.manoeuvres.zigzags import standard_zigzags
@@ -26,6 +25,4 @@ __all__ = [
 
 register_manoeuvre("zigzags", standard_zigzags)
 register_manoeuvre("circles", standard_circles, "Turning circles")
-register_manoeuvre("spirals", standard_spirals)
-register_manoeuvre("pull-outs", standard_pull_outs)
 register_manoeuvre("stops", standard_stops, "Stopping")

@@ -8,12 +8,11 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError, ManoeuvreError
-from shipgym.manoeuvres.excitation import shaft_of
 from shipgym.manoeuvres.execution import distance_sailed, reached, require, ship_length
 from shipgym.manoeuvres.registry import Manoeuvre
-from shipgym.manoeuvres.voyage import Voyage
 from shipgym.models import ShipModel
 from shipgym.models.by_name import takes_name
+from shipgym.models.simulate import Conditions, Passage, as_trial, orders
 from shipgym.ships import ShipEquations
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
@@ -51,7 +50,8 @@ def stopping(
 
     The shaft is ordered to `shaft_speed`, 1/s, 0 for stopped, negative for astern. The
     trial ends at `speed_ratio` of the surge speed at service, 0 for dead in the water,
-    which only a shaft astern brings about; other arguments are as in `pull_out`.
+    which only a shaft astern brings about. Samples are `dt` apart, s, by default a
+    fortieth of the time to travel one ship length; the water depth is in m.
 
     Raises InputError for a ship whose propeller is not in its equations, an order
     astern where they do not hold, an order that does not slow the ship down, or dead in
@@ -60,19 +60,34 @@ def stopping(
     UnstableModelError if the ship runs away.
     """
     order = stopping_order(model, shaft_speed, speed_ratio)
-    voyage = Voyage(model, dt, water_depth)
-    n_steps = max(round(voyage.length_time / voyage.dt), 2)  # of a ship length
+    length_time = model.travel_time
+    step = length_time / 40
+    if dt is not None:
+        step = check_number(dt, "dt", above=0.0, at_most=length_time)
     target = speed_ratio * model.particulars["speed"]
-    column = model.state_names.index("u")
-    longest = 300  # of a stopping trial, L / U0
-    for stretch in range(longest):
-        states = voyage.hold(0.0, order, n_steps)
-        is_slow = states[:, column] <= target
-        if is_slow.any():
-            last = stretch * n_steps + int(is_slow.argmax()) + 1
-            return voyage.trial("straight", max(last, 2))
 
-    trial = voyage.trial("straight")
+    passage = Passage(model, Conditions(water_depth), step)
+    n_steps = max(round(length_time / step), 2)  # of a ship length
+    held = np.tile([0.0, order], (n_steps, 1))
+    column = model.state_names.index("u")
+    states = passage.states(model.service_state, 0)
+    is_slow = False
+    longest = 300  # of a stopping trial, L / U0
+    while not is_slow and len(states) <= longest * n_steps:
+        sailed = step * (len(states) - 1)
+        length = passage.states(states[-1], n_steps)
+        passage.run("simulate", length, held, step, since=sailed)
+        slow = length[1:, column] <= target
+        is_slow = bool(slow.any())
+        last = slow.argmax() + 2 if is_slow else n_steps + 1
+        states = np.concatenate([states, length[1:last]])
+
+    rudder = np.zeros(len(states))
+    shaft = np.full(len(states), order)
+    commands = orders(model, rudder, shaft)
+    trial = as_trial(model, step, states, commands, "straight")
+    if is_slow:
+        return trial
     raise ManoeuvreError(
         f"stopping of {model.name!r}: expected a surge speed of {target:.3g} m/s, got"
         f" {trial['u'][-1]:.3g} m/s after {trial.duration:.0f} s; order the shaft to"
@@ -110,6 +125,18 @@ def stopping_order(model: ShipModel, shaft_speed: float, speed_ratio: float) -> 
             " order astern is never dead in the water"
         )
     return order
+
+
+def shaft_of(model: ShipModel) -> float:
+    """Shaft speed at service speed, 1/s; InputError for a ship without a shaft."""
+    if "n" not in model.command_names:
+        raise InputError(
+            f"model {model.name!r}: expected one that is ordered a shaft speed, got"
+            f" the commands {', '.join(model.command_names)}; its thrust is inside its"
+            " surge coefficients: use a ship with a propeller, such as 'container' or"
+            " 'tanker'"
+        )
+    return model.service_shaft_speed
 
 
 def goes_astern(model: ShipModel) -> bool:

@@ -7,13 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from shipgym.arrays import Flags, Floats
+from shipgym.checks import check_number
+from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import (
     execute_time,
     number_of_steps,
     reached,
     require,
     ship_length,
-    turning_rudder,
 )
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.models.by_name import takes_name
@@ -78,8 +79,10 @@ def turning_circle(
     rudder of 0 or beyond 90 degrees, or a duration or step that is not above 0,
     UnstableModelError if the ship runs away.
     """
-    angle = turning_rudder(rudder_deg, 90.0)
-    rudder = np.full(number_of_steps(duration, dt), angle)
+    check_number(rudder_deg, "rudder_deg", at_least=-90.0, at_most=90.0)
+    if rudder_deg == 0.0:
+        raise InputError("rudder_deg: expected an angle that turns the ship, got 0")
+    rudder = np.full(number_of_steps(duration, dt), np.radians(rudder_deg))
     return simulate(
         model,
         orders(model, rudder),

@@ -1,20 +1,11 @@
 """Figures of the standard manoeuvres, each with what its indices are read from."""
 
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
-from shipgym.errors import InputError
-from shipgym.manoeuvres.execution import distance_sailed, rudder, ship_length
-from shipgym.manoeuvres.spirals import (
-    Spiral,
-    SpiralIndices,
-    pull_out_indices,
-    spiral_indices,
-    turning_point,
-)
+from shipgym.manoeuvres.execution import distance_sailed, ship_length
 from shipgym.manoeuvres.turning import (
     TrackFromOrder,
     TurningIndices,
@@ -131,90 +122,6 @@ def _dimension(x: list[float], y: list[float], name: str, colour: str) -> Any:
     )
 
 
-def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
-    """Plot yaw rate over rudder angle of a spiral, the ways there and back."""
-    angles = spiral.rudder_deg
-    turn = turning_point(angles)
-    lines = [
-        _spiral_line(spiral, slice(0, turn + 1), "there", MODEL),
-        _spiral_line(spiral, slice(turn, None), "and back", PALETTE[1]),
-    ]
-    resolution = np.abs(np.diff(angles)).min()
-    with suppress(InputError):  # a spiral with turns to one side only has no loop
-        indices = spiral_indices(spiral)
-        if indices.loop_width_deg > resolution:
-            lines.append(_loop_line(indices))
-    panel = Panel(
-        lines,
-        x=axis("rudder, deg", zero=True),
-        y=axis("yaw rate, deg/s", zero=True),
-    )
-    return panels([panel], height, hovermode="closest")
-
-
-def _spiral_line(spiral: Spiral, part: slice, name: str, colour: str) -> Any:
-    return line(
-        spiral.rudder_deg[part],
-        spiral.yaw_rate_deg_s[part],
-        name,
-        colour,
-        width=1.6,
-        mode="lines+markers",
-        marker={"size": 5},
-        hovertemplate="%{x:.2f} deg, %{y:.3f} deg/s",
-    )
-
-
-def _loop_line(indices: SpiralIndices) -> Any:
-    """Rudder angles between which a spiral has two yaw rates."""
-    width = indices.loop_width_deg
-    middle = indices.loop_middle_deg
-    return line(
-        [middle - width / 2, middle + width / 2],
-        [0.0, 0.0],
-        f"loop, {width:.2f} deg wide",
-        LIMIT,
-        width=2.6,
-        hoverinfo="name",
-    )
-
-
-def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
-    """Plot yaw rates of pull-outs since the rudder went amidships.
-
-    Those of a stable ship meet.
-
-    The trials, usually one from each side, by the label of their line. InputError if
-    one has no pull-out.
-    """
-    lines = []
-    for label, colour in zip(trials, PALETTE, strict=False):
-        trial = trials[label]
-        indices = pull_out_indices(trial)
-        part = thinned(trial)
-        rate = trial["r"][part]
-        curve = line(
-            trial.t[part] - _release(trial),
-            np.degrees(rate),
-            f"{label}: {indices.residual_rate_deg_s:.3f} deg/s left",
-            colour,
-        )
-        lines.append(curve)
-    panel = Panel(
-        lines,
-        x=axis("time since the rudder was put amidships, s", zero=True),
-        y=axis("yaw rate, deg/s", zero=True),
-    )
-    return panels([panel], height)
-
-
-def _release(trial: Trial) -> float:
-    """Time after which the rudder stays below half of its largest angle, s."""
-    angle = np.abs(rudder(trial))
-    laid = np.flatnonzero(angle > 0.5 * angle.max())
-    return float(trial.t[laid[-1] + 1])
-
-
 def speed_figure(
     trial: Trial, length: float | None = None, height: int = 380
 ) -> Figure:
@@ -235,15 +142,11 @@ def speed_figure(
     return panels(shown, height, columns=2, hovermode="closest")
 
 
-def manoeuvre_figure(sailed: Trial | Spiral) -> Figure:
+def manoeuvre_figure(sailed: Trial) -> Figure:
     """Plot a manoeuvre in the form of its kind; else time histories.
 
     Raises InputError if a channel or the ship's length is missing.
     """
-    if isinstance(sailed, Spiral):
-        return spiral_figure(sailed)
-    if sailed.kind == "pull-out":
-        return pull_out_figure({sailed.name: sailed})
     known: dict[str | None, Callable[[Trial], Figure]] = {
         "zigzag": zigzag_figure,
         "turning-circle": turning_figure,

@@ -61,8 +61,7 @@ def quantity(trial: Trial, name: str) -> Floats | None:
 
 def thinned(trial: Trial) -> slice:
     """The samples that a figure draws."""
-    # Samples of one line that are drawn, more than a page has pixels; spirals have many
-    # more.
+    # of one line, more than a page has pixels
     most_samples = 1500
     step = math.ceil(len(trial) / most_samples)
     return slice(None, None, step)

@@ -65,11 +65,7 @@ def test_a_rudder_ordered_beyond_its_limit_stays_at_the_limit():
     ],
 )
 def test_a_depth_that_no_ship_floats_in_is_told(depth, said):
-    for sail in (
-        manoeuvres.zigzag,
-        manoeuvres.turning_circle,
-        manoeuvres.direct_spiral,
-    ):
+    for sail in (manoeuvres.zigzag, manoeuvres.turning_circle):
         with pytest.raises(InputError, match=f"water_depth: .*{said}"):
             sail(load_model("tanker"), water_depth=depth)
 
@@ -101,8 +97,6 @@ def test_a_step_that_is_far_too_long_is_suspected_and_a_shorter_one_named():
     [
         manoeuvres.zigzag,
         manoeuvres.turning_circle,
-        manoeuvres.pull_out,
-        manoeuvres.direct_spiral,
     ],
 )
 def test_a_ship_that_blows_up_is_an_error_with_time_and_state(sail):
@@ -122,6 +116,4 @@ def test_the_shaft_is_part_of_the_record_of_a_ship_without_shaft_lag():
     trial = manoeuvres.zigzag(ship, 10, 10, duration=200, dt=0.5)
     np.testing.assert_array_equal(trial["n"], ship.service_shaft_speed)
     np.testing.assert_allclose(open_loop(ship, trial)["psi"], trial["psi"], atol=1e-3)
-    steps = manoeuvres.shaft_speed_steps(ship, duration=600)
-    np.testing.assert_array_equal(steps["n"], steps["n_command"])
     assert "n" not in manoeuvres.zigzag(load_model("mariner"), duration=50).channels

@@ -3,7 +3,6 @@ import pytest
 
 from shipgym import InputError, Trial, load_model
 from shipgym.manoeuvres import (
-    Spiral,
     standard_manoeuvres,
     turning_circle,
     turning_indices,
@@ -13,7 +12,6 @@ from shipgym.plots import (
     history_figure,
     manoeuvre_figure,
     path_figure,
-    spiral_figure,
     turning_figure,
     zigzag_figure,
 )
@@ -97,32 +95,11 @@ def test_a_turning_circle_is_drawn_with_its_indices():
     assert diameter.min() == pytest.approx(-indices.tactical_diameter_lengths)
 
 
-def test_the_loop_of_a_spiral_is_marked_where_it_is():
-    t = np.arange(3.0)
-    trial = Trial(t, {"delta": t, "r": t})
-    spiral = Spiral(
-        trial,
-        np.array([10, 3, 1, -5, 1, 3, 10.0]),
-        np.array([1, 0.5, -0.5, -1, -0.7, 0.5, 1.0]),
-    )
-    wide = Spiral(
-        trial,
-        np.array([10, 1, -1, -10, 1, 5, 10.0]),
-        np.array([1, 0.5, -0.5, -1, -0.7, 0.7, 1.0]),
-    )
-    assert [trace.name for trace in spiral_figure(spiral).data] == ["there", "and back"]
-    loop = spiral_figure(wide).data[-1]
-    assert loop.name == "loop, 3.00 deg wide"
-    assert values(spiral_figure(wide), "x", 2) == pytest.approx([0.0, 3.0])
-
-
 def test_every_manoeuvre_has_its_figure():
     ship = load_model("tanker")
     axes = {
         "zigzag 20/20, port first": "heading change and rudder, deg",
         "turning circle 35 deg to port": "ahead, ship lengths",
-        "direct spiral": "yaw rate, deg/s",
-        "pull-out from port": "yaw rate, deg/s",
         "crash stop": "surge, m/s",
     }
     known = standard_manoeuvres(ship)

@@ -181,7 +181,6 @@ def test_instruments_show_the_motion_in_waves(mariner):
     [
         lambda ship, **sea: manoeuvres.zigzag(ship, duration=200.0, **sea),
         lambda ship, **sea: manoeuvres.turning_circle(ship, duration=100.0, **sea),
-        lambda ship, **sea: manoeuvres.prbs_rudder(ship, duration=60.0, **sea),
     ],
 )
 def test_manoeuvres_in_weather(mariner, run):

@@ -1,9 +1,7 @@
-"""A ferry, a product tanker and a training vessel with hull forces by Inoue, surge,
-sway and yaw: a hold-out.
+"""A ferry with hull forces by Inoue: surge, sway and yaw.
 
-They are for counting how often intervals hold the truth on ships that nothing was
-chosen by: their numbers were set by simulated manoeuvres alone, before any model was
-identified from them.
+Her numbers were set by simulated manoeuvres alone, before any model was identified from
+them.
 
 Hull in sway and yaw, even keel: Inoue, Hirano & Kijima 1981, Hydrodynamic derivatives
 on ship manoeuvring, Int. Shipbuilding Progress 28: linear derivatives by their
@@ -17,15 +15,12 @@ resistance, wake, rudder and shaft speed are ours, as usual for the kind of ship
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import fabs, pi, sqrt
 from typing import Any
 
-from shipgym import ShipModel
 from shipgym.engine.mathematics import arctan2, exponential, small_sin_cos
 from shipgym.engine.motion import Motion, Ship
-from shipgym.models.catalogue import model_of
 from shipgym.ships.equations import ShipEquations, record_of
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
@@ -168,70 +163,18 @@ FERRY = known(
         propellers=2.0,
     )
 )
-TANKER = known(
-    Particulars(
-        name="Product tanker",
-        length=170.0,
-        beam=28.5,
-        draught=11.0,
-        block_coefficient=0.80,
-        xg=4.0,
-        speed=7.7,
-        rudder_area=30.0,
-        rudder_aspect_ratio=1.6,
-        propeller_diameter=6.2,
-    )
+STERN = Stern(
+    resistance=0.0141,
+    shaft_speed=2.5,
+    wake=0.12,
+    deduction=0.15,
+    gamma=0.50,
+    lever=-0.9,
+    epsilon=1.0,
+    induced=0.21,
+    drag_deduction=0.27,
 )
-TRAINING = known(
-    Particulars(
-        name="Training vessel",
-        length=60.0,
-        beam=10.8,
-        draught=3.6,
-        block_coefficient=0.58,
-        xg=-0.6,
-        speed=6.7,
-        rudder_area=5.2,
-        rudder_aspect_ratio=1.6,
-        propeller_diameter=2.8,
-    )
-)
-STERNS = {
-    "ferry": Stern(
-        resistance=0.0141,
-        shaft_speed=2.5,
-        wake=0.12,
-        deduction=0.15,
-        gamma=0.50,
-        lever=-0.9,
-        epsilon=1.0,
-        induced=0.21,
-        drag_deduction=0.27,
-    ),
-    "product-tanker": Stern(
-        resistance=0.0113,
-        shaft_speed=1.75,
-        wake=0.38,
-        deduction=0.20,
-        gamma=0.50,
-        lever=-0.9,
-        epsilon=1.0,
-        induced=0.30,
-        drag_deduction=0.30,
-    ),
-    "training-vessel": Stern(
-        resistance=0.0168,
-        shaft_speed=3.3,
-        wake=0.20,
-        deduction=0.18,
-        gamma=0.45,
-        lever=-0.9,
-        epsilon=1.0,
-        induced=0.21,
-        drag_deduction=0.27,
-    ),
-}
-Coefficients = record_of(numbers(FERRY, STERNS["ferry"]), __name__)
+Coefficients = record_of(numbers(FERRY, STERN), __name__)
 
 
 def rudder_forces(
@@ -313,23 +256,5 @@ SHIP = ShipEquations(
     accelerations,
     FERRY,
     SteeringGear(rudder_rate_deg_s=3.0, time_constant=0.5),
-    service_shaft_speed=STERNS["ferry"].shaft_speed,
+    service_shaft_speed=STERN.shaft_speed,
 )
-
-
-def inoue_ship(name: str, particulars: Particulars, rudder_rate: float) -> ShipModel:
-    """One of the ships, by the equations of all."""
-    return replace(
-        model_of(SHIP, numbers(particulars, STERNS[name])),
-        name=name,
-        particulars=particulars,
-        service_shaft_speed=STERNS[name].shaft_speed,
-        steering=replace(SHIP.steering, rudder_rate_deg_s=rudder_rate),
-    )
-
-
-INOUE_SHIPS: dict[str, Callable[[], ShipModel]] = {
-    "ferry": lambda: model_of(SHIP),
-    "product-tanker": lambda: inoue_ship("product-tanker", TANKER, 2.34),
-    "training-vessel": lambda: inoue_ship("training-vessel", TRAINING, 4.0),
-}
