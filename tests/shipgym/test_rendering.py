@@ -66,13 +66,8 @@ def test_a_rudder_to_starboard_shows_to_starboard(side):
 @pytest.mark.parametrize(
     ("name", "options", "shown", "absent"),
     [
-        (COURSE, {}, ["HULL", "ORDER", "WAKE", "RUDDER"], ["PATH", "WIND", "CURRENT"]),
-        (
-            PATH,
-            {"sea": TROUBLED},
-            ["PATH", "CORRIDOR", "WAKE", "WIND", "CURRENT"],
-            [],
-        ),
+        (COURSE, {}, ["HULL", "ORDER", "WAKE", "RUDDER"], ["PATH", "CORRIDOR"]),
+        (PATH, {"sea": TROUBLED}, ["PATH", "CORRIDOR", "WAKE"], []),
     ],
 )
 def test_environments_show_what_there_is(name, options, shown, absent):
