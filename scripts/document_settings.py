@@ -24,6 +24,7 @@ NAMES = (
     "preview_lq",
 )
 PAGES = tuple(FOLDER / f"{name}.md" for name in NAMES)
+FIRST = "CourseKeeping"  # whose page comes first
 MARKS = re.compile(
     r"<!-- settings: ([\w-]+) -->\n.*?<!-- end of settings -->", re.DOTALL
 )
@@ -31,9 +32,13 @@ SIGNS = {"above": "above", "at_least": "at least", "at_most": "at most"}
 
 
 def table(task: str) -> str:
-    """The settings of a task as Markdown."""
+    """The settings of a task as Markdown, without those that course keeping has too."""
     lines = ["| argument | default | bounds | meaning |", "| --- | --- | --- | --- |"]
+    usual = [] if task == FIRST else keywords(read_definition(FIRST).Settings)
+    known = {name: default for name, _, _, default in usual}
     for name, _, setting, default in keywords(read_definition(task).Settings):
+        if name in known and known[name] == default:
+            continue
         bounds = [
             f"{sign} {getattr(setting, key):g}"
             for key, sign in SIGNS.items()
