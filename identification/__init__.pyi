@@ -37,9 +37,6 @@ from .estimators.rm_svm import RMSVM as RMSVM
 from .estimators.search import SearchResult as SearchResult
 from .estimators.tuned import TunedLSSVM as TunedLSSVM
 from .judging.uncertainty import Uncertainty as Uncertainty
-from .models.forces import (
-    identify_forces as identify_forces,
-)
 from .models.prior_knowledge import PriorKnowledge as PriorKnowledge
 from .models.refinement import Refinement as Refinement
 from .pipeline import identify as identify

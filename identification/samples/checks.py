@@ -20,8 +20,8 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
     if structure.captive:
         raise InputError(
             "structure: expected one for free-running trials, got"
-            f" '{structure.name}', which is identified from captive tests with the"
-            " channels X, Y, N; use identification.identify_forces"
+            f" '{structure.name}', whose added masses only forces of captive tests tell;"
+            " choose another, such as 'abkowitz'"
         )
     if not trials:
         raise InputError(

@@ -18,13 +18,8 @@ from numpy.typing import NDArray
 
 from identification.design.reduction import Reduction
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
-from identification.models.forces import (
-    FORCES,
-    ForceRegression,
-    fit_forces,
-    force_variances,
-)
 from papers import xu2020_rank
+from papers.captive import FORCES, ForceRegression, fit_forces, force_variances
 from papers.dense_dual import (
     dense_dual_multipliers,
     dense_dual_solution,

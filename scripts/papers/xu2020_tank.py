@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.design.reduction import Reduction, backward_elimination
-from identification.models.forces import FORCES, ForceRegression, force_regression
-from papers.captive import oscillate
+from papers.captive import FORCES, ForceRegression, force_regression, oscillate
 from shipgym.models import ShipModel
 from shipgym.ships import get_structure
 from shipgym.ships.particulars import Particulars

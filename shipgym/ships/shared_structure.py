@@ -133,8 +133,8 @@ class SharedStructure(Structure):
         """Refuse: free-running trials cannot tell unknown added masses from mass."""
         raise InputError(
             f"structure '{self.name}': expected captive tests with the channels X, Y,"
-            " N, got free-running trials: its added masses are among the unknowns; use"
-            " identification.identify_forces"
+            " N, got free-running trials: its added masses are among the unknowns;"
+            " choose another, such as 'abkowitz'"
         )
 
     def to_dict(self) -> dict[str, Any]:
