@@ -38,13 +38,11 @@ def identify_options(
     ] = None,
     current: Annotated[
         str | None,
-        Option(
-            help="Current over ground: auto, shared, trial, none or { north, east }."
-        ),
+        Option(help="Current over ground: auto, none or { north, east } in m/s."),
     ] = None,
     wind: Annotated[
         str | None,
-        Option(help="Logged wind: auto, none, constant, coefficients or a table."),
+        Option(help="Logged wind: auto, none, coefficients or a table."),
     ] = None,
     preprocessing: Annotated[
         str | None,

@@ -75,21 +75,18 @@ class Options:
     uncertainty : str or Uncertainty
         Where the covariance of the coefficients comes from.
     current : str or table
-        Steady current in velocities over ground. "auto": estimated, one for all trials
-        unless they contradict each other, and removed if it differs from zero; "none":
-        left in the velocities; or a known one as a table of m/s, such as
+        Steady current in velocities over ground. "auto": estimated, and removed if it
+        differs from zero; "none": left in; or a known one in m/s, such as
         `{ north = 0.2, east = -0.1 }`. Columns current_north and current_east take
         precedence.
     wind : str or table
         Force of the wind in columns wind_speed and wind_from. "auto": by Blendermann's
-        coefficients, where wind was logged; "none": not removed; or by a name of
-        coefficients in `shipgym.sea`, or a table such as
-        `{ coefficients = "blendermann-ferry", relative = true }`; relative means the
-        wind felt on board, measured from the bow.
+        coefficients; "none": not removed; or a name of coefficients, or a table such as
+        `{ coefficients = "blendermann-ferry", relative = true }` (relative: felt on
+        board, measured from the bow).
     rudder_bias : {"auto", "none"}
-        Constant moment of a rudder that is off, or of a propeller that turns one way.
-        "auto": a structure without a constant is given one where the bias differs from
-        zero; "none": it stays as it is.
+        "auto": a structure without a constant gets one where the bias of the rudder
+        differs from zero; "none": it stays as it is.
     hold_out : sequence of str
         Trials, by name, that are only predicted, as if they were marked validate.
     guarded : bool
