@@ -55,30 +55,6 @@ def test_after_an_error_or_an_interruption_all_is_as_before(tmp_path, earlier, e
     assert everything(tmp_path) == ["ship", "ship/metrics.json"]
 
 
-def test_an_interruption_while_a_folder_takes_its_place_leaves_the_earlier_result(
-    tmp_path, earlier, monkeypatch
-):
-    rename = Path.replace
-
-    def replace(self, to):
-        if to == earlier and self.name.endswith(".draft"):
-            raise KeyboardInterrupt
-        return rename(self, to)
-
-    monkeypatch.setattr(Path, "replace", replace)
-    with pytest.raises(KeyboardInterrupt):
-        write(earlier)
-    assert everything(tmp_path) == ["ship", "ship/metrics.json"]
-
-
-def test_a_folder_set_aside_by_a_killed_process_is_back(tmp_path):
-    (tmp_path / ".ship.0-1.old").mkdir()
-    (tmp_path / ".ship.0-1.old" / "model.json").write_text("old")
-    with pytest.raises(RuntimeError):
-        write(tmp_path / "ship", RuntimeError())
-    assert everything(tmp_path) == RESULT
-
-
 def prepared(folder):
     """Places that cannot take results, by name."""
     (folder / "thesis").mkdir()
@@ -138,35 +114,10 @@ def test_a_second_process_takes_the_folder_over_when_the_first_is_killed(tmp_pat
         with pytest.raises(InputError, match=said):
             write(tmp_path / "ship")
         holder.kill()
-    assert len(everything(tmp_path)) == 3  # lock, draft, and the file in it
+    assert len(everything(tmp_path)) == 4  # folder, lock, draft, the file in it
     remove_drafts.cache_clear()
     write(tmp_path / "ship")
     assert everything(tmp_path) == RESULT
-
-
-@pytest.mark.parametrize("error", [errno.EXDEV, errno.EBUSY])
-def test_a_mounted_volume_takes_results(tmp_path, earlier, monkeypatch, error):
-    rename = Path.replace
-
-    def replace(self, to):
-        if earlier in (self, to):
-            raise OSError(error, "mounted")
-        return rename(self, to)
-
-    monkeypatch.setattr(Path, "replace", replace)
-    write(earlier)
-    assert everything(tmp_path) == RESULT
-
-
-def test_where_nothing_can_be_beside_a_folder_locks_and_drafts_are_in_it(
-    tmp_path, earlier, monkeypatch
-):
-    monkeypatch.setattr("os.path.ismount", lambda path: path == earlier)
-    for _ in range(2):
-        with whole_folder(earlier, NAMES) as draft:
-            (draft / "model.json").write_text("new")
-            assert {Path(one).parts[0] for one in everything(tmp_path)} == {"ship"}
-        assert everything(tmp_path) == RESULT
 
 
 def test_a_write_protected_folder_is_refused(tmp_path, earlier, monkeypatch):
