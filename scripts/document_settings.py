@@ -21,7 +21,6 @@ NAMES = (
     "environments/course_keeping",
     "environments/path_following",
     "controllers",
-    "preview_lq",
 )
 PAGES = tuple(FOLDER / f"{name}.md" for name in NAMES)
 FIRST = "CourseKeeping"  # whose page comes first
@@ -51,12 +50,17 @@ def table(task: str) -> str:
 
 
 def controller_table(kind: str) -> str:
-    """The settings of a controller as Markdown."""
+    """The settings of a controller as Markdown, without those of the LQ."""
     lines = ["| setting | default | bounds | meaning |", "| --- | --- | --- | --- |"]
+    usual = controller_class("lq").settings_type
     settings = controller_class(kind).settings_type
+    assert usual is not None
     assert settings is not None
+    known = [] if kind == "lq" else [(one.name, one.metadata) for one in fields(usual)]
     for one in fields(settings):
         about = one.metadata
+        if (one.name, about) in known:
+            continue
         bounds = [f"{SIGNS[key]} {value:g}" for key, value in about["bounds"].items()]
         default = "" if one.default is None else f"{one.default:g}"
         bounded = ", ".join(bounds)
