@@ -1,4 +1,4 @@
-"""Errors of a ship's sensors: noise, resolution, outliers, gaps, delay and drift."""
+"""Errors of a ship's sensors: noise, resolution, outliers and drift."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from shipgym.arrays import Flags, Floats
+from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
 from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.errors import InputError
@@ -19,9 +19,9 @@ from shipgym.trials.units import CHANNELS, DEGREE, check_channel
 class Sensor:
     """One sensor, in the SI unit of its channel. The default is a perfect one.
 
-    The reading at time t is the signal at t - latency_s, plus drift and white noise,
-    now and then an outlier, rounded to the resolution. Raises InputError for a negative
-    or infinite number, a probability above 1, or a drift without correlation time.
+    A reading is the signal plus drift and white noise, now and then an outlier, rounded
+    to the resolution. Raises InputError for a negative or infinite number, a
+    probability above 1, or a drift without correlation time.
 
     Attributes
     ----------
@@ -37,8 +37,6 @@ class Sensor:
         Of each reading.
     outlier_size : float
         Standard deviation of what an outlier adds.
-    latency_s : float
-        Age of the signal at the time its reading is logged, s.
     """
 
     noise: float = 0.0
@@ -47,7 +45,6 @@ class Sensor:
     drift_time_s: float = 300.0
     outlier_probability: float = 0.0
     outlier_size: float = 0.0
-    latency_s: float = 0.0
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -63,9 +60,9 @@ class Sensor:
     ) -> Floats:
         """Readings at `times` of a signal given at `t`, linear in between; all in s."""
         n = times.size
-        reading: Floats = np.interp(times - self.latency_s, t, signal)
+        reading: Floats = np.interp(times, t, signal)
         if self.drift:
-            wander = gauss_markov(times, self.drift_time_s, rng)
+            wander = _gauss_markov(times, self.drift_time_s, rng)
             reading += self.drift * wander
         reading += self.noise * rng.standard_normal(n)
 
@@ -78,7 +75,7 @@ class Sensor:
         return reading
 
 
-def gauss_markov(
+def _gauss_markov(
     t: Floats, correlation_time_s: float, rng: np.random.Generator
 ) -> Floats:
     """First-order Gauss-Markov process of unit variance, stationary; times in s.
@@ -131,17 +128,10 @@ class Sensors:
     sampling_s : float or None
         Time between logged samples, s, on straight lines between those of the trial;
         None: as in the trial.
-    dropout_probability : float
-        Of each sample to begin a gap in the log.
-    dropout_samples : float
-        Mean length of a gap, samples. A gap leaves the samples out of the measured
-        trial.
     """
 
     by_channel: Mapping[str, Sensor] = field(default_factory=lambda: SEA_TRIAL)
     sampling_s: float | None = None
-    dropout_probability: float = 0.0
-    dropout_samples: float = 3.0
 
     def __post_init__(self) -> None:
         for channel, sensor in self.by_channel.items():
@@ -152,44 +142,30 @@ class Sensors:
                 )
         if self.sampling_s is not None:
             check_number(self.sampling_s, "sensors sampling_s", above=0.0)
-        check_number(
-            self.dropout_probability,
-            "sensors dropout_probability",
-            at_least=0.0,
-            below=1.0,
-        )
-        check_number(self.dropout_samples, "sensors dropout_samples", at_least=1.0)
         object.__setattr__(self, "by_channel", MappingProxyType(dict(self.by_channel)))
 
     def measure(self, trial: Trial, seed: int = 0) -> Trial:
         """Log of a trial, the true motion, by these sensors.
 
         The same seed gives the same readings, channel by channel: a sensor more or less
-        changes no other. Channels and name are the trial's; samples in gaps are left
-        out. Heading, heel and their rates have the first-order motion in waves in them;
-        the weather itself is not measured. Raises InputError if the seed is no integer
-        >= 0, or sampling and gaps leave fewer than three samples.
+        changes no other. Channels and name are the trial's. Heading, heel and their
+        rates have the first-order motion in waves in them; the weather itself is not
+        measured. Raises InputError if the seed is no integer >= 0, or the sampling
+        leaves fewer than three samples.
         """
         check_whole(seed, "seed", at_least=0)
         t = self._logged_times(trial)
-        logged = self._outside_gaps(t.size, seed)
-        if logged.sum() < FEWEST_SAMPLES:
-            raise InputError(
-                f"trial {trial.name!r}: expected at least {FEWEST_SAMPLES} samples"
-                f" outside the gaps, got {logged.sum()} of {t.size}; give a smaller"
-                " dropout_probability"
-            )
         readings = {}
         for name, values in _measurable(trial).items():
             if name in ("delta_command", "n_command"):
-                reading = orders_at(t, trial.t, values)
-            else:
-                sensor = self.by_channel.get(name, Sensor())
-                rng = _random(seed, name)
-                reading = sensor.read(t, trial.t, values, rng)
-            readings[name] = reading[logged]
+                readings[name] = _orders_at(t, trial.t, values)
+                continue
+            sensor = self.by_channel.get(name, Sensor())
+            # whichever other channels are drawn
+            rng = np.random.default_rng([seed, CHANNELS.index(name)])
+            readings[name] = sensor.read(t, trial.t, values, rng)
         return Trial(
-            t[logged],
+            t,
             readings,
             name=trial.name,
             kind=trial.kind,
@@ -215,23 +191,6 @@ class Sensors:
         times: Floats = trial.t[0] + since_start
         return times
 
-    def _outside_gaps(self, count: int, seed: int) -> Flags:
-        """Flags of samples that are not in a gap."""
-        rng = _random(seed, SEA_CHANNELS[0])
-        is_start = rng.random(count) < self.dropout_probability
-        starts = np.flatnonzero(is_start)
-        lengths = rng.geometric(1.0 / self.dropout_samples, starts.size)
-        ends = starts + lengths
-        logged = np.ones(count, dtype=bool)
-        for start, end in zip(starts, ends, strict=True):
-            logged[start:end] = False
-        return logged
-
-
-def _random(seed: int, channel: str) -> np.random.Generator:
-    """Random numbers of a channel, whichever others are drawn."""
-    return np.random.default_rng([seed, CHANNELS.index(channel)])
-
 
 def _measurable(trial: Trial) -> dict[str, Floats]:
     """Channels that can be measured: with motion in waves, without the weather."""
@@ -246,7 +205,7 @@ def _measurable(trial: Trial) -> dict[str, Floats]:
     return measurable
 
 
-def orders_at(times: Floats, t: Floats, orders: Floats) -> Floats:
+def _orders_at(times: Floats, t: Floats, orders: Floats) -> Floats:
     """Orders at some times, each held from its time t to the next; all in s."""
     last = np.searchsorted(t, times + 1e-9, side="right") - 1
     return np.asarray(orders[last])

@@ -76,10 +76,19 @@ def at(values, row, value):
         ({"psi": TURN, "sog": U}, "columns: expected sog and cog, got sog alone"),
         ({"psi": SWING, "delta": np.where(T < 50, NAN, 0.0)}, "expected a number, got"),
         ({"ground": U}, "no column is named like a channel"),
+        (
+            {"t": 1e3 * T, "psi": TURN, "x": X, "y": Y, "u": U, "v": V},
+            'wrong unit of time, declare t = { column = "t", unit = "ms" }',
+        ),
+        (
+            {"t": T / 120.0, "psi": TURN},
+            'wrong unit: declare t = { column = "t", unit = "min" }',
+        ),
+        ({"psi": 2.0 * TURN, "delta": V - 0.5, "u": U}, "with the rudder to one side"),
     ],
 )
 def test_what_no_ship_does_is_refused_with_a_remedy(tmp_path, columns, message):
-    assert message in refusal(written(tmp_path / "run.csv", t=T, **columns))
+    assert message in refusal(written(tmp_path / "run.csv", **{"t": T, **columns}))
 
 
 @pytest.mark.parametrize(
@@ -217,17 +226,27 @@ def zigzag():
     return {"t": t, "psi": np.cumsum(0.5 * r), "r": r, "delta": delta}
 
 
-@pytest.mark.parametrize("delay", [-3.0, 1.5, 4.0])
-def test_a_late_channel_is_named_left_or_corrected(tmp_path, zigzag, delay):
-    late = np.interp(zigzag["t"] - delay, zigzag["t"], zigzag["r"])
-    path = written(tmp_path / "run.csv", **{**zigzag, "r": late})
-    assert "expected one clock, got one of which the yaw rate is" in refusal(path)
+@pytest.mark.parametrize(
+    ("channel", "words", "delay"),
+    [
+        ("r", "yaw rate", -3.0),
+        ("r", "yaw rate", 1.5),
+        ("r", "yaw rate", 4.0),
+        ("delta", "rudder", 3.0),
+    ],
+)
+def test_a_late_channel_is_named_left_or_corrected(
+    tmp_path, zigzag, channel, words, delay
+):
+    late = np.interp(zigzag["t"] - delay, zigzag["t"], zigzag[channel])
+    path = written(tmp_path / "run.csv", **{**zigzag, channel: late})
+    assert f"expected one clock, got one of which the {words} is" in refusal(path)
     errors = {}
     for choice in ("keep", "correct"):
         trial = Trial.from_csv(path, sensors={"clock_offsets": choice})
-        right = np.interp(trial.t, zigzag["t"], zigzag["r"])
-        errors[choice] = np.abs(trial["r"] - right)[20:-20].mean()
-    assert errors["correct"] < 0.2 * errors["keep"]
+        right = np.interp(trial.t, zigzag["t"], zigzag[channel])
+        errors[choice] = np.abs(trial[channel] - right)[20:-20].mean()
+    assert errors["correct"] < 0.3 * errors["keep"]
 
 
 def test_a_rudder_of_the_other_sign_is_refused(tmp_path, zigzag):

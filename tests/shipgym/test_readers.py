@@ -73,6 +73,7 @@ def test_a_table_is_read_however_it_is_written(tmp_path, content, settings):
         (b"t,u\n0,1\n1,x\n2,1\n", "line 3 (data row 2), column 'u': expected a number"),
         (gzip.compress(CSV, mtime=0)[:-9], "packed by gzip, got one that is cut short"),
         (b"a,b\n0,1\n", "no column is named like a channel"),
+        (b"t,u\n09:30:02,1\nnoon,2\n", "line 3 (data row 2), column 't': expected a"),
     ],
 )
 def test_what_is_no_table_is_refused_with_its_line(tmp_path, content, message):

@@ -56,23 +56,6 @@ def test_readings_are_multiples_of_the_resolution(zigzag):
     assert np.abs(reading - zigzag["delta"]).max() <= 0.5 * step * (1.0 + 1e-9)
 
 
-def test_a_late_sensor_shows_the_past(zigzag):
-    reading = Sensors({"psi": Sensor(latency_s=1.5)}).measure(zigzag)["psi"]
-    np.testing.assert_allclose(reading[15:], zigzag["psi"][:-15], atol=1e-12)
-    np.testing.assert_array_equal(reading[:15], zigzag["psi"][0])
-
-
-def test_gaps_leave_samples_out(still):
-    """A gap begins at a sample with 1 %, is 4 samples long in the mean, so about 3.9 %
-    are lost."""
-    measured = Sensors({}, dropout_probability=0.01, dropout_samples=4.0).measure(still)
-    assert 1.0 - len(measured) / N == pytest.approx(0.039, abs=0.004)
-    gaps = np.diff(measured.t) - 1.0
-    assert gaps[gaps > 0].mean() == pytest.approx(4.0, abs=0.3)
-    single = Sensors({}, dropout_probability=0.01, dropout_samples=1.0).measure(still)
-    assert 1.0 - len(single) / N == pytest.approx(0.01, abs=0.002)  # gaps of one sample
-
-
 def test_a_seed_replays_and_sensors_do_not_disturb_each_other(zigzag):
     first, again, other = (Sensors().measure(zigzag, seed) for seed in (7, 7, 8))
     assert first.sha256 == again.sha256 != other.sha256
@@ -106,7 +89,7 @@ def test_instruments_feel_the_motion_in_waves_and_the_weather_is_not_logged():
 def test_a_sea_trial_still_tells_the_overshoot(zigzag):
     """6 degrees of overshoot, read through the sensors of a sea trial at 2 Hz, are
     right to a few tenths."""
-    measured = Sensors(sampling_s=0.5, dropout_probability=0.01).measure(zigzag, 1)
+    measured = Sensors(sampling_s=0.5).measure(zigzag, 1)
     seen = manoeuvres.zigzag_indices(measured).overshoot_1_deg
     assert seen == pytest.approx(
         manoeuvres.zigzag_indices(zigzag).overshoot_1_deg, abs=0.4
@@ -123,12 +106,6 @@ def test_a_sea_trial_still_tells_the_overshoot(zigzag):
         (
             lambda t: Sensors(sampling_s=500.0).measure(t),
             "sampling_s: expected at most half of the 600 s",
-        ),
-        (
-            lambda t: Sensors(dropout_probability=0.999, dropout_samples=1e5).measure(
-                t
-            ),
-            "outside the gaps",
         ),
         (lambda t: Sensors().measure(t, -1), "seed: .*-1"),
     ],

@@ -236,6 +236,11 @@ def test_length_and_one_trial_are_enough(tmp_path):
         ),
         ("xg = 0.25", "", ": [[trials]] 2 origin: expected xg"),
         ("[ship]", "[ship", ": not valid TOML"),
+        (
+            "[identify]",
+            "[sensors]\ngnss_antenna = { forward = 125.0 }\n[identify]",
+            ": [sensors] gnss_antenna.forward: expected at most 4.2 m",
+        ),
         ("[ship]", "[ship]\nestimated = []", "unknown key 'estimated'"),
     ],
 )

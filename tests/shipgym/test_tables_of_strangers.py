@@ -12,6 +12,8 @@ from shipgym.errors import InputError
 from shipgym.trials.guesses import guess_trial
 from shipgym.trials.rudder_sign import rudder_sign
 from shipgym.trials.trial import Trial
+from shipgym.trials.units import KNOT
+from tests.shipgym.one_zigzag import sailed
 
 CASES = Path(__file__).parents[3] / "shared" / "cases" / "logs"
 N = 240
@@ -20,32 +22,13 @@ EPOCH = 1_620_035_990
 NAMES = ["Time", "Lat", "Lon", "SOG", "COG", "Heading", "Rudder"]
 
 
-def sail():
-    """A first-order ship of 7 m/s in a zigzag, in the columns of `NAMES`, degrees."""
-    t = np.arange(float(N))
-    r = delta = 0.0
-    psi, north, east = 40.0, 0.0, 0.0
-    order = 20.0
-    rows = []
-    for k in range(N):
-        lat = 57.7 + north / 111_387.0
-        lon = 11.8 + east / 59_640.0
-        rows.append([lat, lon, 7.0 * 3600.0 / 1852.0, psi, psi, delta])
-        if k > 20:
-            if np.sign(order) * (psi - 40.0) > 20.0:
-                order = -order
-            delta += np.clip(order - delta, -2.5, 2.5)
-        r += (0.08 * delta - r) / 25.0
-        psi += r
-        north += 7.0 * np.cos(np.radians(psi))
-        east += 7.0 * np.sin(np.radians(psi))
-    # from a gyro that does not only copy the course
-    table = np.array(rows)
-    table[:, 4] += np.where(t > 20.0, 0.5 * np.sin(t), 0.0)
-    return table
-
-
-SAILED = sail()
+#: The columns of `NAMES` but the time, degrees and knots.
+SAILED = np.array(
+    [
+        [one.lat, one.lon, one.speed / KNOT, one.course, one.psi, one.rudder]
+        for one in sailed(N)
+    ]
+)
 CELLS = [
     [
         (BEGIN + timedelta(seconds=k)).isoformat(sep=" "),
