@@ -7,7 +7,6 @@ import struct
 import sys
 from datetime import UTC, datetime
 from functools import reduce
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +18,6 @@ from shipgym.trials.trial import Trial
 from shipgym.trials.units import DEGREE, KNOT
 from tests.shipgym.one_zigzag import SPEED, sailed
 
-CASES = Path(__file__).parents[2].parent / "shared" / "cases" / "logs"
 BEGIN = datetime(2021, 5, 3, 9, 59, 50, tzinfo=UTC).timestamp()
 
 
@@ -497,40 +495,3 @@ def test_a_log_of_ais_is_named(tmp_path):
     lines = ["!AIVDM,1,1,,B,13u=gHP3CWPlvs2Q8sHW:5fD0h6a,0*1B"] * 9
     with pytest.raises(InputError, match="this looks like a log of AIS"):
         read(tmp_path, lines)
-
-
-# --- the cases beside the checkout
-
-RIGHT = {
-    "nmea_rare_talker.nmea": (540, "GIHDG (3 values) left out"),
-    "nmea_hdg_rmcvar.nmea": (500, "with the variation of GPRMC added"),
-    "nmea_hdg_novar.nmea": (500, "the heading stays magnetic"),
-    "nmea_hdm.nmea": (500, "with the variation of GPRMC added"),
-    "nmea_nosum.nmea": (500, "have no checksum"),
-    "nmea_rsa_port_only.nmea": (500, "in the port field of AGRSA"),
-    "nmea_rsa_nostatus.nmea": (500, "is empty"),
-    "nmea_xdr_rudder.nmea": (500, ""),
-    "nmea_zda_hdt_rsa.nmea": (600, "no speed is known"),
-    "nmea_tag.nmea": (300, ""),
-    "nmea_midnight_gll.nmea": (500, ""),
-    "opencpn_vdr_new.csv": (240, ""),
-}
-
-
-@pytest.mark.skipif(not CASES.is_dir(), reason="the cases lie beside the checkout")
-@pytest.mark.parametrize("name", RIGHT)
-def test_cases_beside_the_checkout_are_right(name):
-    rows, words = RIGHT[name]
-    trial = guess_trial(CASES / name).trial
-    truth = np.genfromtxt(CASES / "truth.csv", delimiter=",", skip_header=1)
-    assert rows - 1 <= len(trial) <= rows
-    k = np.round(trial.t - trial.t[0]).astype(int)
-    turned = 16.0 if "novar" in name else 0.0
-    error = trial["psi"] / DEGREE + turned - truth[k, 1]
-    assert np.sqrt(np.mean(error**2)) < 0.5
-    error = trial["delta"] / DEGREE - truth[k, 3]
-    assert abs(error.mean()) < 0.3
-    assert error.std() < 1.0
-    if "u" in trial and not turned:
-        assert np.abs(trial["u"] - truth[k, 4]).max() < 0.2
-    assert not words or any(words in note for note in trial.notes)

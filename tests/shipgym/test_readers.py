@@ -1,7 +1,6 @@
 """Logs of every kind of file become the same trial; faults have their place."""
 
 import gzip
-import math
 from functools import reduce
 
 import numpy as np
@@ -199,11 +198,6 @@ def nmea_log(path, *texts):
     return path
 
 
-def fix(clock):
-    """Position and time, of no date."""
-    return f"GPGGA,{clock},5741.0000,N,01144.0000,E,1,08,1.0,20.0,M,,M,,"
-
-
 def rmc(k, speed="10.0"):
     clock = f"00{k // 60:02d}{k % 60:02d}.00"
     return f"GPRMC,{clock},A,5741.{k:04d},N,01144.0000,E,{speed},000.0,310524,,,A"
@@ -211,19 +205,6 @@ def rmc(k, speed="10.0"):
 
 def each_second(*texts, count=6):
     return [text for k in range(count) for text in (rmc(k), *texts)]
-
-
-def test_a_log_without_dates_goes_on_at_midnight(tmp_path):
-    clocks = ("235958", "235959", "000000", "000001", "000002")
-    texts = [text for clock in clocks for text in (fix(clock), "HEHDT,30.0,T")]
-    path = nmea_log(tmp_path / "log.nmea", *texts, "GPVTG,10,T,,M,8,N,,K")
-    with pytest.raises(InputError, match="at berth"):
-        Trial.from_csv(path)
-    texts = [text for text in texts if "GGA" not in text]
-    clocked = [f"GPZDA,{clock},31,05,2024,00,00" for clock in clocks[:2]]
-    clocked += [f"GPZDA,{clock},01,06,2024,00,00" for clock in clocks[2:]]
-    pairs = [one for pair in zip(clocked, texts, strict=True) for one in pair]
-    assert Trial.from_csv(nmea_log(path, *pairs)).duration == 4.0
 
 
 @pytest.mark.parametrize(
@@ -313,9 +294,3 @@ def test_a_tenth_of_the_sentences_may_be_damaged(tmp_path):
 )
 def test_a_log_without_time_or_motion_is_refused(texts, message, tmp_path):
     assert message in refusal(nmea_log(tmp_path / "log.nmea", *texts * 3))
-
-
-def test_the_true_heading_of_a_log_goes_on_at_north(tmp_path):
-    texts = [text for k in range(6) for text in (rmc(k), f"HEHDT,{(357 + k) % 360},T")]
-    trial = Trial.from_csv(nmea_log(tmp_path / "log.nmea", *texts))
-    assert np.ptp(trial["psi"]) == pytest.approx(5 * math.pi / 180)

@@ -6,13 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from shipgym.errors import InputError
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.ship_file import ShipFile
-from shipgym.trials.trial import Trial
 
 SHIPS = Path(__file__).parents[1] / "ships"
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
@@ -170,22 +167,6 @@ def test_trials_can_be_asked_for_by_use(folder):
         ship.trials("fitting")
 
 
-def test_length_and_one_trial_are_enough(tmp_path):
-    write_csv(
-        tmp_path / "run.csv",
-        {"t": T, "r": 0.01 * np.cos(0.1 * T), "delta": 0.1 * np.cos(0.1 * T)},
-    )
-    (tmp_path / "ship.toml").write_text(
-        '[ship]\nlength = 7\n[[trials]]\nfile = "run.csv"\n'
-    )
-    ship = ShipFile.load(tmp_path / "ship.toml")
-    (trial,) = ship.trials()
-    assert ship.steering is None
-    assert ship.identify == {}
-    assert trial.use == "fit"
-    assert trial.derived == {"psi"}
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -289,32 +270,6 @@ def test_what_is_wrong_in_a_trial_names_ship_file_and_csv_file(folder):
     )
 
 
-@settings(
-    max_examples=100,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
-@given(
-    line=st.integers(0, SHIP.count("\n") - 1),
-    new=st.text('[]{}=".#abfx0127-\n', max_size=12),
-)
-def test_whatever_stands_in_a_ship_file_the_answer_is_a_ship_or_one_message(
-    folder, line, new
-):
-    lines = SHIP.split("\n")
-    lines[line] = new
-    (folder / "ship.toml").write_text("\n".join(lines))
-    try:
-        ship: ShipFile | InputError = ShipFile.load(folder / "ship.toml")
-    except InputError as error:
-        ship = error
-    assert (
-        str(folder) in str(ship)
-        if isinstance(ship, InputError)
-        else ship.particulars.length > 0.0
-    )
-
-
 # --- real input
 
 
@@ -340,18 +295,3 @@ def test_every_measured_trial_is_imported(path):
         yaw_rate, rudder = trial["r"][steps], trial["delta"][steps]
         change, level = np.diff(yaw_rate), np.column_stack([yaw_rate[:-1], rudder[:-1]])
         assert np.linalg.lstsq(level, change, rcond=None)[0][1] > 0.0
-
-
-@needs_data
-@pytest.mark.parametrize(
-    "run",
-    ["kvlcc2_hsva/Z_05_01.csv", "kvlcc2_hsva/Z_20_05.csv", "kvlcc2_marin/zz_10_m.csv"],
-)
-def test_earth_fixed_velocities_that_are_not_declared_are_noticed(run):
-    columns = {"x": "x0", "y": "y0", "psi": "psi", "u": "dx0", "v": "dy0"}
-    with pytest.raises(InputError, match='declare velocity_frame = "earth"'):
-        Trial.from_csv(DATA / run, columns)
-    earth = Trial.from_csv(DATA / run, columns, velocity_frame="earth")
-    body = Trial.from_csv(DATA / run, columns | {"u": "u", "v": "v"})
-    np.testing.assert_allclose(earth["u"], body["u"], atol=0.01)
-    np.testing.assert_allclose(earth["v"], body["v"], atol=0.01)

@@ -2,7 +2,6 @@
 
 import gzip
 from datetime import datetime, timedelta
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from shipgym.trials.trial import Trial
 from shipgym.trials.units import KNOT
 from tests.shipgym.one_zigzag import sailed
 
-CASES = Path(__file__).parents[3] / "shared" / "cases" / "logs"
 N = 240
 BEGIN = datetime(2021, 5, 3, 9, 59, 50)
 EPOCH = 1_620_035_990
@@ -290,7 +288,6 @@ def test_the_side_of_the_rudder_is_told_by_a_zigzag_alone(noise):
 
 
 #: What cannot be read, and what stands for a rudder: by the README of the cases.
-NOT_READ = {"csv_dst": "line 303", "ais_marinecadastre": None}
 
 
 @pytest.mark.parametrize("is_gap", [False, True])
@@ -347,33 +344,3 @@ def test_parts_of_a_time_in_columns_are_one_time(tmp_path, names, layouts):
     guess = guess_trial(path)
     check(guess)
     assert guess.unused == []
-
-
-@pytest.mark.skipif(not CASES.exists(), reason="the cases are not here")
-@pytest.mark.parametrize(
-    "name", sorted(path.stem for path in CASES.glob("*.csv") if "_" in path.stem)
-)
-def test_the_cases_are_read_as_their_readme_says(name):
-    path = CASES / f"{name}.csv"
-    if name.startswith("opencpn"):
-        pytest.skip("sentences")
-    if NOT_READ.get(name):
-        with pytest.raises(InputError, match=NOT_READ[name]):
-            guess_trial(path)
-        return
-    guess = guess_trial(path)
-    trial = guess.trial
-    if name in NOT_READ:
-        assert (len(trial), guess.columns[3].unit) == (100, "knots")
-        assert "without rudder nothing can be identified" in trial.notes[0]
-        return
-    truth = np.genfromtxt(CASES / "truth.csv", delimiter=",", skip_header=1)
-    heading, delta, u = truth[:, [1, 3, 4]].T
-    apart = (np.degrees(trial["psi"]) - heading + 180.0) % 360.0 - 180.0
-    assert (len(trial), np.sqrt(np.mean(apart**2)) < 0.5) == (600, True)
-    assert np.abs(trial["u"] - u).max() < 0.2
-    assert np.corrcoef(trial["delta"], delta)[0, 1] > 0.9999
-    if not name.startswith("usv"):
-        assert np.std(np.degrees(trial["delta"]) - delta) < 0.1
-    if "dash" in name:
-        assert dict(trial.repaired) == {"psi": 17, "delta": 12}
