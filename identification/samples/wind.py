@@ -10,7 +10,6 @@ from shipgym import Particulars, Trial
 from shipgym.arrays import Floats
 from shipgym.models.simulate import WIND
 from shipgym.sea.wind import AIR_DENSITY, WindCurves, wind_curves
-from shipgym.sea.wind_coefficients import WindTable
 from shipgym.ships.inertia import particulars_inertia
 from shipgym.trials.navigation import rotate_to_body
 
@@ -32,9 +31,9 @@ def measured_wind(
     particulars : Particulars
         Of the ship.
     option : str or mapping
-        Coefficients as in `shipgym.sea.Wind`, or a table of ``coefficients``, by name
-        or a table themselves, and ``relative``: whether speed and direction are those
-        felt on board, the latter from the bow.
+        Coefficients as in `shipgym.sea.Wind`, or a table of ``coefficients`` and
+        ``relative``: whether speed and direction are those felt on board, the latter
+        from the bow.
     """
     table: dict[str, Any] = {"coefficients": option}
     if isinstance(option, Mapping):
@@ -43,7 +42,10 @@ def measured_wind(
     if not needed <= trial.channels.keys():
         return trial
 
-    curves = _curves(particulars, table.get("coefficients", "auto"))
+    coefficients = table.get("coefficients", "auto")
+    if coefficients == "auto":
+        coefficients = "blendermann"
+    curves = wind_curves(particulars, coefficients)
     relative = table.get("relative", False)
     forces = _forces_on(trial, curves, relative)
     inertia = particulars_inertia(particulars.completed())[:, :3]
@@ -73,16 +75,6 @@ def _forces(curves: WindCurves, ahead: Floats, aside: Floats) -> Floats:
     square = ahead**2 + aside**2
     pressure = 0.5 * AIR_DENSITY * square
     return pressure * np.array(coefficients)
-
-
-def _curves(particulars: Particulars, coefficients: Any) -> WindCurves:
-    """Wind coefficients by their name, or by a table of them."""
-    if isinstance(coefficients, Mapping):
-        given = WindTable.from_dict(coefficients, "wind coefficients")
-        return wind_curves(particulars, given)
-    if coefficients == "auto":
-        coefficients = "blendermann"
-    return wind_curves(particulars, coefficients)
 
 
 def _felt_wind(trial: Trial, relative: bool) -> tuple[Floats, Floats]:

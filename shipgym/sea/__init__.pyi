@@ -13,4 +13,3 @@ from .waves import jonswap as jonswap
 from .wind import AIR_DENSITY as AIR_DENSITY
 from .wind import WindCurves as WindCurves
 from .wind import wind_curves as wind_curves
-from .wind_coefficients import WindTable as WindTable

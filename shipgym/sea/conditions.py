@@ -13,12 +13,10 @@ from shipgym.checks import (
     check_number,
     check_table,
     check_text,
-    did_you_mean,
-    quoted,
 )
 from shipgym.constants import GRAVITY
 from shipgym.errors import InputError
-from shipgym.sea.wind_coefficients import WindTable, check_coefficients
+from shipgym.sea.wind_coefficients import check_coefficients
 
 
 @dataclass(frozen=True)
@@ -73,15 +71,15 @@ class Wind:
         episode of an environment.
     gust : bool
         True for a speed that varies about its mean.
-    coefficients : str or WindTable
-        "blendermann" (type of ship guessed from its fullness), "blendermann-" and a
-        type of `BLENDERMANN`, or a table of your own.
+    coefficients : str
+        "blendermann" (type of ship guessed from its fullness), or "blendermann-" and a
+        type of ship.
     """
 
     speed: float
     from_deg: float | None = None
     gust: bool = True
-    coefficients: str | WindTable = "blendermann"
+    coefficients: str = "blendermann"
 
     def __post_init__(self) -> None:
         _keep_number(self, "wind", "speed", at_least=0.0, at_most=75.0)
@@ -175,7 +173,6 @@ class SeaState:
     """One row of the table of sea states."""
 
     name: str  # in the words of WMO code table 3700
-    code: int  # its number there
     # Hs, m, and Tp, s, taken
     significant_height: float
     peak_period: float
@@ -190,10 +187,10 @@ def sea_states() -> dict[str, SeaState]:
     Atlantic (also Lee & Bales, STANAG 4194).
     """
     return {
-        "calm": SeaState("calm", 0, 0.0, 0.0, 0.0),
-        "slight": SeaState("slight", 3, 0.88, 7.5, wind_at_10_m(13.5)),
-        "moderate": SeaState("moderate", 4, 1.88, 8.8, wind_at_10_m(19.0)),
-        "rough": SeaState("rough", 5, 3.25, 9.7, wind_at_10_m(24.5)),
+        "calm": SeaState("calm", 0.0, 0.0, 0.0),
+        "slight": SeaState("slight", 0.88, 7.5, wind_at_10_m(13.5)),
+        "moderate": SeaState("moderate", 1.88, 8.8, wind_at_10_m(19.0)),
+        "rough": SeaState("rough", 3.25, 9.7, wind_at_10_m(24.5)),
     }
 
 
@@ -204,26 +201,6 @@ def wind_at_10_m(knots: float) -> float:
     """
     metres_per_second = knots * 1852.0 / 3600.0
     return float(metres_per_second * (10.0 / 19.5) ** (1.0 / 7.0))
-
-
-def find_sea_state(name: str | int) -> SeaState:
-    """Sea state by its name or WMO code; InputError for one that is not there."""
-    states = sea_states()
-    for state in states.values():
-        if name in (state.name, state.code) and not isinstance(name, bool):
-            return state
-
-    hint = ""
-    if isinstance(name, str):
-        hint = did_you_mean(name, states)
-    names = quoted(states)
-    codes = [str(state.code) for state in states.values()]
-    listed = ", ".join(codes)
-    raise InputError(
-        f"sea state: expected one of {names}, or their WMO codes {listed}, got"
-        f" {name!r}; for another sea give Weather(wind=Wind(...), waves=Waves(...))"
-        f".{hint}"
-    )
 
 
 # ---- weather ------------------------------------------------------------
@@ -256,7 +233,7 @@ class Weather:
     @classmethod
     def from_sea_state(
         cls,
-        name: str | int,
+        name: str,
         from_deg: float | None = 45.0,
         current: Current | None = None,
     ) -> Weather:
@@ -266,13 +243,15 @@ class Weather:
 
         Parameters
         ----------
-        name : {"calm", "slight", "moderate", "rough", 0, 3, 4, 5}
+        name : {"calm", "slight", "moderate", "rough"}
         from_deg : float or None
             Where wind and waves come from, degrees clockwise from north, by default
             north-east; None: drawn for each episode of an environment.
         current : Current, optional
         """
-        state = find_sea_state(name)
+        states = sea_states()
+        own = "; for another sea give Weather(wind=Wind(...), waves=Waves(...))"
+        state = states[check_choice(name, states, "sea state", own)]
         if state.wind_speed == 0.0:
             return cls(current=current, name=state.name)
         waves = Waves(state.significant_height, state.peak_period, from_deg)
@@ -318,12 +297,7 @@ def _read_part(kind: type[Any], content: Any, where: str) -> Any:
         allowed=[field.name for field in known],
         required=[field.name for field in known if field.default is MISSING],
     )
-    values = dict(table)
-    coefficients = values.get("coefficients")
-    if isinstance(coefficients, Mapping):
-        place = f"{where} coefficients"
-        values["coefficients"] = WindTable.from_dict(coefficients, place)
-    return kind(**values)
+    return kind(**table)
 
 
 def as_weather(

@@ -11,14 +11,7 @@ from shipgym.constants import GRAVITY
 from shipgym.sea.added_resistance import added_resistance
 from shipgym.sea.conditions import Waves
 from shipgym.sea.estimates import hull_of, weather_particulars
-from shipgym.sea.harmonics import (
-    Harmonics,
-    circle,
-    cosine_coefficients,
-    half_circle,
-    mirrored,
-    sine_coefficients,
-)
+from shipgym.sea.harmonics import circle, half_circle, mirrored
 from shipgym.sea.waves import (
     draught_attenuation,
     frequencies,
@@ -49,15 +42,6 @@ class WaveDrift:
     # of the slow variation, s and without unit
     time_constant: float
     standard_deviation: float
-
-    def harmonics(self, n: int = 8) -> Harmonics:
-        """Fourier series up to the n-th harmonic, for kernels; K, which heels, is 0."""
-        return Harmonics(
-            X=cosine_coefficients(self.X, n),
-            Y=sine_coefficients(self.Y, n),
-            N=sine_coefficients(self.N, n),
-            K=np.zeros(n),
-        )
 
 
 def wave_drift(

@@ -40,6 +40,16 @@ def mirrored(half: ArrayLike, sign: float = 1.0) -> Floats:
     return np.concatenate([values, sign * other_side])
 
 
+def harmonics(X: Floats, Y: Floats, N: Floats, K: Floats, n: int) -> Harmonics:
+    """Fourier series of forces over :func:`circle`, up to the n-th harmonic."""
+    return Harmonics(
+        X=cosine_coefficients(X, n),
+        Y=sine_coefficients(Y, n),
+        N=sine_coefficients(N, n),
+        K=sine_coefficients(K, n),
+    )
+
+
 def cosine_coefficients(curve: Floats, n: int) -> Floats:
     """Coefficients of an even curve over :func:`circle`: the mean, then n cosines."""
     series: Floats = np.fft.rfft(curve).real[: n + 1] * 2.0 / len(curve)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from shipgym.arrays import Floats
 from shipgym.sea.conditions import Waves
 from shipgym.sea.estimates import Hull, hull_of, weather_particulars
-from shipgym.sea.harmonics import circle, cosine_coefficients, half_circle, mirrored
+from shipgym.sea.harmonics import circle, half_circle, mirrored
 from shipgym.sea.waves import (
     encounter_frequency,
     frequencies,
@@ -86,18 +86,6 @@ class WaveMotion:
     # shape (points,); rad2
     heading_variance: Floats
     roll_variance: Floats
-
-    def heading_variance_harmonics(self, n: int = 8) -> Floats:
-        """Cosine series of the heading's variance, mean first, shape (n + 1,).
-
-        A sum may be slightly negative where the variance is 0 (waves from ahead and
-        astern): clip it there.
-        """
-        return cosine_coefficients(self.heading_variance, n)
-
-    def roll_variance_harmonics(self, n: int = 8) -> Floats:
-        """Cosine series of the roll's variance, shape (n + 1,); clip it likewise."""
-        return cosine_coefficients(self.roll_variance, n)
 
 
 def wave_motion(

@@ -8,7 +8,7 @@ from shipgym.engine.records import flat
 from shipgym.sea.conditions import Current, Waves, Weather, Wind
 from shipgym.sea.drift import wave_drift
 from shipgym.sea.filters import Filter, GaussMarkov
-from shipgym.sea.harmonics import Harmonics
+from shipgym.sea.harmonics import Harmonics, cosine_coefficients, harmonics
 from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.motions import wave_motion
 from shipgym.sea.open_sea import SeaParameters
@@ -88,8 +88,9 @@ def with_wind(
 ) -> SeaParameters:
     """Parameters of a sea with a wind, and what it does to a ship."""
     mobility = mobility_matrix(model, water_depth)
-    areas = wind_curves(model.particulars, wind.coefficients).harmonics(HARMONICS)
-    forces = Harmonics(*(0.5 * AIR_DENSITY * series for series in areas))
+    curves = wind_curves(model.particulars, wind.coefficients)
+    series = harmonics(curves.X, curves.Y, curves.N, curves.K, HARMONICS)
+    forces = Harmonics(*(0.5 * AIR_DENSITY * row for row in series))
     by_wind = _accelerations(mobility, forces)
     of_her_own_wind = float(by_wind.X.sum())  # at angle 0
     return sea._replace(
@@ -117,7 +118,9 @@ def with_waves(
     drift = wave_drift(waves, model.particulars)
     slow_drift = GaussMarkov(drift.time_constant, drift.standard_deviation)
     motion = wave_motion(waves, model.particulars)
-    by_waves = _accelerations(mobility, drift.harmonics(HARMONICS))
+    no_heel = np.zeros(len(drift.chi))
+    forces = harmonics(drift.X, drift.Y, drift.N, no_heel, HARMONICS)
+    by_waves = _accelerations(mobility, forces)
     return sea._replace(
         waves_from=_radians(waves.from_deg),
         wave_frequency=spectrum.peak_frequency,
@@ -129,9 +132,17 @@ def with_waves(
         drift_sway=Sines(*by_waves.Y),
         drift_yaw=Sines(*by_waves.N),
         drift_roll=Sines(*by_waves.K),
-        heading_variance=Cosines(*motion.heading_variance_harmonics(HARMONICS)),
-        roll_variance=Cosines(*motion.roll_variance_harmonics(HARMONICS)),
+        heading_variance=_variances(motion.heading_variance),
+        roll_variance=_variances(motion.roll_variance),
     )
+
+
+def _variances(curve: Floats) -> Cosines:
+    """Series of variances over the angle of the waves.
+
+    It may be slightly negative where they are 0: the kernel clips it there.
+    """
+    return Cosines(*cosine_coefficients(curve, HARMONICS))
 
 
 def discrete(process: GaussMarkov, step: float) -> Filter:

@@ -9,16 +9,9 @@ from shipgym.arrays import Floats
 from shipgym.sea.conditions import Wind
 from shipgym.sea.estimates import weather_particulars
 from shipgym.sea.filters import GaussMarkov
-from shipgym.sea.harmonics import (
-    Harmonics,
-    circle,
-    cosine_coefficients,
-    sine_coefficients,
-)
+from shipgym.sea.harmonics import circle
 from shipgym.sea.wind_coefficients import (
     BLENDERMANN,
-    WindCoefficients,
-    WindTable,
     blendermann_coefficients,
     blendermann_type,
     check_coefficients,
@@ -55,24 +48,10 @@ class WindCurves:
     # shape (points,); heeling moment about the waterline by dynamic pressure, positive
     # to starboard, m3
     K: Floats
-    estimated: tuple[str, ...] = ()  # particulars that were estimated for it
-
-    def harmonics(self, n: int = 8) -> Harmonics:
-        """Fourier series of the curves up to the n-th harmonic, for kernels.
-
-        For n = 8 the largest difference from the curve is below 1.5 % of its largest
-        value for Blendermann's coefficients (`tests/shipgym/test_wind.py`).
-        """
-        return Harmonics(
-            X=cosine_coefficients(self.X, n),
-            Y=sine_coefficients(self.Y, n),
-            N=sine_coefficients(self.N, n),
-            K=sine_coefficients(self.K, n),
-        )
 
 
 def wind_curves(
-    particulars: Particulars, coefficients: str | WindTable = "blendermann"
+    particulars: Particulars, coefficients: str = "blendermann"
 ) -> WindCurves:
     """Wind forces of a ship over all directions; coefficients as in `Wind`.
 
@@ -85,47 +64,27 @@ def wind_curves(
     frontal = ship.require("frontal_area")
     lateral = ship.require("lateral_area")
     length = ship.require("length_overall")
+    height = ship.require("lateral_centroid_height")
 
     angle = circle()
     from_starboard = angle <= np.pi
     folded = np.where(from_starboard, angle, 2.0 * np.pi - angle)
     to_lee = np.where(from_starboard, -1.0, 1.0)
 
-    c, height = _coefficients(ship, coefficients, folded)
-    used = {
-        "length_overall",
-        "frontal_area",
-        "lateral_area",
-        "lateral_centroid",
-        "lateral_centroid_height",
-    }
+    type_of_ship = blendermann_type(coefficients, ship.require("block_coefficient"))
+    c = blendermann_coefficients(
+        BLENDERMANN[type_of_ship],
+        folded,
+        area_ratio=frontal / lateral,
+        centroid_ratio=ship.require("lateral_centroid") / length,
+    )
     return WindCurves(
         angle,
         X=frontal * c.CX,
         Y=to_lee * lateral * c.CY,
         N=to_lee * lateral * length * c.CN,
         K=to_lee * lateral * height * c.CK,
-        estimated=tuple(sorted(ship.estimated & used)),
     )
-
-
-def _coefficients(
-    ship: Particulars, coefficients: str | WindTable, angle: Floats
-) -> tuple[WindCoefficients, float]:
-    """Coefficients at angles from 0 to pi, and the height that CK is divided by."""
-    length = ship.require("length_overall")
-    lateral = ship.require("lateral_area")
-    height = ship.require("lateral_centroid_height")
-    if isinstance(coefficients, WindTable):
-        return coefficients.at(angle), lateral / length
-    type_of_ship = blendermann_type(coefficients, ship.require("block_coefficient"))
-    found = blendermann_coefficients(
-        BLENDERMANN[type_of_ship],
-        angle,
-        area_ratio=ship.require("frontal_area") / lateral,
-        centroid_ratio=ship.require("lateral_centroid") / length,
-    )
-    return found, height
 
 
 def gust_filter(wind: Wind) -> GaussMarkov:

@@ -1,20 +1,11 @@
-"""Wind coefficients: published ones, and tables of a user's own ship.
+"""Wind coefficients by Blendermann 1994 for types of ship (`wind.toml`)."""
 
-The published ones are by Blendermann 1994 for types of ship (`wind.toml`).
-"""
-
-from __future__ import annotations
-
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy import cos, degrees, interp, pi, sin, where
+from numpy import cos, pi, sin, where
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_number, check_table, did_you_mean, quoted
-from shipgym.errors import InputError
+from shipgym.checks import check_choice
 from shipgym.files import shipped_toml
 
 
@@ -36,117 +27,14 @@ class WindCoefficients(NamedTuple):
     CY: Floats  # sway force to lee by lateral area
     # yaw moment about midship, bow to lee, by lateral area and length overall
     CN: Floats
-    # heeling moment about the waterline, to lee, by lateral area and a height
+    # heeling moment about the waterline, to lee, by lateral area and the height of its
+    # centroid
     CK: Floats
 
 
 _TABLES = shipped_toml("shipgym.sea", "wind.toml")
 #: By type of ship.
 BLENDERMANN = {ship: Blendermann(*row) for ship, row in _TABLES["blendermann"].items()}
-
-
-@dataclass(frozen=True)
-class WindTable:
-    """Measured or computed wind coefficients of your own ship.
-
-    Raises InputError for angles that do not rise from 0 to 180, rows of another length,
-    and forces to one side of a wind from ahead or astern.
-
-    Parameters
-    ----------
-    angles_deg : tuple of float
-        Where the relative wind comes from, degrees from the bow, rising from 0 to 180;
-        the other side is the mirror image.
-    CX : tuple of float
-        Surge force divided by the frontal area; negative in head wind.
-    CY : tuple of float
-        Sway force to the LEE side divided by the lateral area, positive.
-    CN : tuple of float
-        Yaw moment about midship by lateral area and length overall, positive where the
-        bow turns to lee.
-    CK : tuple of float, optional
-        Heeling moment about the waterline to lee by lateral area and its mean height
-        (area by length overall); none is taken where it is not given.
-    """
-
-    angles_deg: tuple[float, ...]
-    CX: tuple[float, ...]
-    CY: tuple[float, ...]
-    CN: tuple[float, ...]
-    CK: tuple[float, ...] | None = None
-
-    def __post_init__(self) -> None:
-        lateral = ["CY", "CN"]
-        if self.CK is not None:
-            lateral.append("CK")
-        for name in ("angles_deg", "CX", *lateral):
-            row = _numbers(getattr(self, name), f"wind table {name}")
-            object.__setattr__(self, name, row)
-        self._check_angles()
-        for name in ("CX", *lateral):
-            self._check_length(name)
-        for name in lateral:
-            self._check_symmetry(name)
-
-    def _check_angles(self) -> None:
-        angles = self.angles_deg
-        enough = len(angles) >= 3
-        rising = np.all(np.diff(angles) > 0.0)
-        if not (enough and rising and angles[0] == 0.0 and angles[-1] == 180.0):
-            raise InputError(
-                "wind table angles_deg: expected at least three that rise from 0 to"
-                f" 180, got {angles}"
-            )
-
-    def _check_length(self, name: str) -> None:
-        expected = len(self.angles_deg)
-        row = getattr(self, name)
-        if len(row) != expected:
-            raise InputError(
-                f"wind table {name}: expected {expected} values, one for each angle,"
-                f" got {len(row)}"
-            )
-
-    def _check_symmetry(self, name: str) -> None:
-        row = getattr(self, name)
-        if row[0] != 0.0 or row[-1] != 0.0:
-            raise InputError(
-                f"wind table {name}: expected 0 at 0 and 180 degrees, for a ship with"
-                f" port-starboard symmetry, got {row[0]:g} and {row[-1]:g}"
-            )
-
-    @classmethod
-    def from_dict(
-        cls, mapping: Mapping[str, Any], where: str = "wind table"
-    ) -> WindTable:
-        """Read a table from JSON; InputError for an unknown or missing row."""
-        needed = ("angles_deg", "CX", "CY", "CN")
-        table = check_table(
-            mapping,
-            where,
-            allowed=(*needed, "CK"),
-            required=needed,
-        )
-        return cls(**table)
-
-    def at(self, angle: Floats) -> WindCoefficients:
-        """Coefficients at angles from 0 to pi, straight between those of the table."""
-        at = degrees(angle)
-        CK = np.zeros_like(at)
-        if self.CK is not None:
-            CK = interp(at, self.angles_deg, self.CK)
-        return WindCoefficients(
-            CX=interp(at, self.angles_deg, self.CX),
-            CY=interp(at, self.angles_deg, self.CY),
-            CN=interp(at, self.angles_deg, self.CN),
-            CK=CK,
-        )
-
-
-def _numbers(values: Any, where: str) -> tuple[float, ...]:
-    if not isinstance(values, list | tuple | np.ndarray):
-        raise InputError(f"{where}: expected a list of numbers, got {values!r}")
-    return tuple(check_number(value, f"{where}[{i}]") for i, value in enumerate(values))
 
 
 def coefficient_names() -> tuple[str, ...]:
@@ -157,17 +45,7 @@ def coefficient_names() -> tuple[str, ...]:
 
 def check_coefficients(value: Any, where: str) -> None:
     """Raise InputError for what `Wind(coefficients=...)` does not understand."""
-    if isinstance(value, WindTable):
-        return
-    names = coefficient_names()
-    if isinstance(value, str) and value in names:
-        return
-    hint = ""
-    if isinstance(value, str):
-        hint = did_you_mean(value, names)
-    raise InputError(
-        f"{where}: expected a WindTable or one of {quoted(names)}, got {value!r}.{hint}"
-    )
+    check_choice(value, coefficient_names(), where)
 
 
 def blendermann_type(name: str, block_coefficient: float) -> str:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipgym import InputError, Particulars, Waves, load_model, sea_states
+from shipgym import InputError, Particulars, Waves, load_model
 from shipgym.constants import GRAVITY
 from shipgym.sea import wave_drift, wave_motion
 from shipgym.sea.added_resistance import added_resistance
@@ -19,7 +19,6 @@ from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.waves import draught_attenuation, slow_drift, wave_spectrum
 from shipgym.ships import get_structure
 from shipgym.ships.inertia import inertia
-from tests.shipgym.harmonics import evaluate_cosines, evaluate_sines
 
 SHIPS = ["mariner", "container", "tanker", "kvlcc2", "kvlcc2-l7"]
 KVLCC2 = weather_particulars(load_model("kvlcc2").particulars)
@@ -105,24 +104,6 @@ def test_waves_push_to_lee_and_turn_the_ship_beam_on(ship):
         drift.Y, -drift.Y[mirror], atol=1e-9 * abs(drift.Y[beam])
     )
     np.testing.assert_allclose(drift.N, -drift.N[mirror], atol=1e-9 * abs(drift.N[bow]))
-
-
-@pytest.mark.parametrize("ship", SHIPS)
-@pytest.mark.parametrize("state", ["slight", "moderate", "rough"])
-def test_eight_harmonics_of_the_drift_suffice_in_a_spread_sea(ship, state):
-    sea = sea_states()[state]
-    drift = wave_drift(
-        Waves(sea.significant_height, sea.peak_period), load_model(ship).particulars
-    )
-    series = drift.harmonics(8)
-    for name, sums in (
-        ("X", evaluate_cosines),
-        ("Y", evaluate_sines),
-        ("N", evaluate_sines),
-    ):
-        curve = getattr(drift, name)
-        error = np.abs(sums(getattr(series, name), drift.chi) - curve).max()
-        assert error < 0.001 * np.abs(curve).max()
 
 
 def newman_spectrum(sea, draught, mu):

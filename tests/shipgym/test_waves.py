@@ -7,14 +7,12 @@ from shipgym import Particulars, Waves, load_model
 from shipgym.constants import GRAVITY
 from shipgym.sea import (
     jonswap,
-    sea_states,
     wave_motion,
 )
 from shipgym.sea.drift import wave_drift
 from shipgym.sea.estimates import weather_particulars
 from shipgym.sea.motions import heading_response, roll_response
 from shipgym.sea.waves import pierson_moskowitz, wave_filter
-from tests.shipgym.harmonics import evaluate_cosines
 
 GAMMAS = [1.0, 2.0, 3.3, 7.0]
 SHIPS = ["mariner", "container", "tanker", "kvlcc2", "kvlcc2-l7"]
@@ -99,23 +97,6 @@ def test_long_crested_waves_from_ahead_neither_turn_nor_heel():
     assert motion.heading_variance[[0, 180]] == pytest.approx(0.0, abs=1e-20)
     assert motion.roll_variance[[0, 180]] == pytest.approx(0.0, abs=1e-20)
     assert motion.roll_variance[90] > 100.0 * motion.roll_variance[5]
-
-
-@pytest.mark.parametrize("ship", SHIPS)
-@pytest.mark.parametrize("state", ["slight", "moderate", "rough"])
-def test_eight_harmonics_of_the_variances_suffice_in_a_spread_sea(ship, state):
-    sea = sea_states()[state]
-    motion = wave_motion(
-        Waves(sea.significant_height, sea.peak_period), load_model(ship).particulars
-    )
-    for curve, series in (
-        (motion.heading_variance, motion.heading_variance_harmonics(8)),
-        (motion.roll_variance, motion.roll_variance_harmonics(8)),
-    ):
-        assert (
-            np.abs(evaluate_cosines(series, motion.chi) - curve).max()
-            < 0.003 * curve.max()
-        )
 
 
 def test_without_a_service_speed_a_ship_lies_still_in_waves():

@@ -8,16 +8,12 @@ import numpy as np
 import pytest
 
 from shipgym import InputError, Particulars, Wind, load_model
-from shipgym.sea import (
-    WindTable,
-    wind_curves,
-)
+from shipgym.sea import wind_curves
 from shipgym.sea.estimates import weather_particulars
 from shipgym.sea.wind import gust_filter
 from shipgym.sea.wind_coefficients import (
     coefficient_names,
 )
-from tests.shipgym.harmonics import evaluate_cosines, evaluate_sines
 
 AREAS = {
     "length_overall": 180.0,
@@ -55,19 +51,6 @@ def test_wind_pushes_to_lee_and_its_mirror_image_the_other_way(coefficients):
     # on the starboard bow: back, to port, bow to port, heeling to port
     assert np.sign(at(curves, 40)).tolist() == [-1, -1, -1, -1]
     assert np.sign(at(curves, 320)).tolist() == [-1, 1, 1, 1]
-
-
-@pytest.mark.parametrize("coefficients", coefficient_names())
-@pytest.mark.parametrize("ship", [S175, KVLCC2])
-def test_eight_harmonics_stay_near_the_curve(coefficients, ship):
-    curves = wind_curves(ship, coefficients)
-    series = curves.harmonics()
-    assert [len(row) for row in series] == [9, 8, 8, 8]
-    for name in "XYNK":
-        curve = getattr(curves, name)
-        sums = evaluate_cosines if name == "X" else evaluate_sines
-        error = np.abs(sums(getattr(series, name), curves.angle) - curve).max()
-        assert error < 0.015 * np.abs(curve).max()
 
 
 def test_similar_ships_have_the_same_coefficients():
@@ -114,21 +97,6 @@ def test_what_is_not_known_above_the_water_is_estimated_as_documented():
     assert boat.roll_period == pytest.approx(
         2.0 * (0.373 + 0.092 - 0.043) * 4.0 / np.sqrt(0.2)
     )
-
-
-def test_a_table_of_ones_own_is_followed():
-    table = WindTable(
-        (0, 90, 180),
-        (-0.6, 0.0, 0.5),
-        (0.0, 0.8, 0.0),
-        (0.0, 0.05, 0.0),
-        (0.0, 1.2, 0.0),
-    )
-    curves = wind_curves(S175, table)
-    assert at(curves, 45) == pytest.approx(
-        (-0.3 * 600, -0.4 * 2700, -0.025 * 2700 * 180, -0.6 * 2700 * 2700 / 180)
-    )
-    np.testing.assert_array_equal(wind_curves(S175, replace(table, CK=None)).K, 0.0)
 
 
 def test_coefficients_that_are_not_known_are_refused():
