@@ -73,7 +73,10 @@ Setting = Annotated[
     Option(
         "--set",
         metavar="SETTING=VALUE",
-        help="A setting, never varied by `tune`; repeatable.",
+        help=(
+            "A setting, never varied by `tune`; repeatable. base=none learns from"
+            " scratch."
+        ),
     ),
 ]
 Randomise = Annotated[
@@ -130,21 +133,11 @@ def train_command(
     out: Annotated[Path, Option(metavar="FOLDER", help="Folder of the run.")],
     *,
     fields: dict[str, Any],
-    from_nothing: Annotated[
-        bool,
-        Option(
-            "--from-nothing",
-            help="Learn from scratch, without a base controller (--set base=none).",
-        ),
-    ] = False,
     seed: Annotated[
         int | None, Option(min=0, max=799, help="Random seed; default: 0.")
     ] = None,
     threads: Annotated[
         int | None, Option(min=1, help="Threads for torch and the ships; default: 1.")
-    ] = None,
-    max_seconds: Annotated[
-        float | None, Option(min=0.0, help="Time of learning; --resume continues.")
     ] = None,
     resume: Annotated[
         bool, Option("--resume", help="Continue the run in the folder.")
@@ -158,12 +151,10 @@ def train_command(
     old at most. With --resume, options that are not given keep their values; others
     must be the same.
     """
-    if from_nothing:
-        fields["settings"]["base"] = "none"
     more = {"seed": seed, "threads": threads}
     fields |= {name: value for name, value in more.items() if value is not None}
     plan = _checked_plan(fields, out, resume)
-    _print_result(_train(plan, out, resume, max_seconds), out)
+    _print_result(_train(plan, out, resume), out)
 
 
 def _named(texts: list[str] | None, option: str) -> dict[str, Any]:
@@ -197,9 +188,7 @@ def _checked_plan(fields: dict[str, Any], out: Path, resume: bool) -> TrainingPl
     return plan
 
 
-def _train(
-    plan: TrainingPlan, out: Path, resume: bool, max_seconds: float | None
-) -> TrainingResult:
+def _train(plan: TrainingPlan, out: Path, resume: bool) -> TrainingResult:
     from agents.cli.terminal import training_bar
     from agents.training.run_folder import CHECKPOINT
     from agents.training.training import train
@@ -210,7 +199,6 @@ def _train(
                 plan,
                 out,
                 resume=resume,
-                max_seconds=max_seconds,
                 on_progress=on_progress,
                 command=shlex.join(["shipgym", *sys.argv[1:]]),
             )
@@ -238,12 +226,6 @@ def _print_result(result: TrainingResult, out: Path) -> None:
         steps = reached["steps"]
         seconds = reached["seconds"]
         say(f"LQ's cost reached at step {steps:,}, after {seconds:.0f} s")
-    if not result.finished:
-        total = result.plan.settings.total_steps
-        say(
-            f"stopped at step {result.steps:,} of {total:,}: continue with --resume"
-            f" --out {out}"
-        )
     say(f"written: {agent}")
 
 

@@ -167,7 +167,6 @@ def sb3_arguments(
     renamed: dict[str, Any] = {}
     if isinstance(settings, PPOSettings):
         names += ["n_steps", "n_epochs", "gae_lambda", "clip_range", "ent_coef"]
-        names += ["vf_coef", "max_grad_norm"]
     if isinstance(settings, OffPolicySettings):
         names += ["buffer_size", "learning_starts", "train_freq", "gradient_steps"]
         names += ["tau"]
@@ -206,15 +205,12 @@ def _network(settings: LearningSettings) -> dict[str, Any]:
             "qf": list(settings.critic_arch),
         }
     if isinstance(settings, TQCSettings):
-        network["n_critics"] = settings.n_critics
         network["n_quantiles"] = settings.n_quantiles
     return network
 
 
-def _rate(settings: LearningSettings) -> float | Callable[[float], float]:
+def _rate(settings: LearningSettings) -> Callable[[float], float]:
     """Learning rate by the part of the training that is left."""
-    if settings.schedule == "constant":
-        return settings.learning_rate
 
     def falling(left: float) -> float:
         # the last rollout ends after the last step

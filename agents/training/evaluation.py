@@ -71,7 +71,6 @@ class TrainingResult:
     steps: int
     lq_cost: float | None  # of LQ on the same episodes
     seconds: float  # of training and evaluation, also before it was resumed
-    finished: bool  # false where the time was up before
     resumed_from: int | None  # steps of the checkpoint that it went on from
 
     @property
@@ -90,7 +89,6 @@ class TrainingResult:
         return {
             "configuration": self.plan.configuration(),
             "steps": self.steps,
-            "finished": self.finished,
             "resumed_from": self.resumed_from,
             "seconds": self.seconds,
             "best_cost": self.best_cost,

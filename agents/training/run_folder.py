@@ -14,7 +14,7 @@ from shipgym.checks import check_fields, check_format, check_table, data_only
 from shipgym.errors import InputError
 from shipgym.files import make_folder, read_json, write_json
 
-FORMAT = 2
+FORMAT = 3
 RUN = "run.json"
 CHECKPOINT = "checkpoint.pt"
 PROGRESS = "progress.json"

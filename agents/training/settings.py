@@ -93,16 +93,11 @@ class LearningSettings(Settings):
         "samples of one gradient step", at_least=1, search=[128, 256, 512, 1024, 2048]
     )
     learning_rate: float = setting(
-        "learning rate of Adam at the beginning",
+        "learning rate of Adam at the beginning; it falls to 0 at the end",
         1e-3,
         above=0.0,
         at_most=1.0,
         search=(1e-4, 3e-3, "log"),
-    )
-    schedule: str = setting(
-        "course of the learning rate; linear falls to 0 at the end of the training",
-        "linear",
-        options=("constant", "linear"),
     )
     gamma: float = setting(
         "discount of a decision",
@@ -174,8 +169,6 @@ class PPOSettings(LearningSettings):
     ent_coef: float = setting(
         "weight of the entropy", 0.0, at_least=0.0, search=(1e-6, 1e-2, "log")
     )
-    vf_coef: float = setting("weight of the value's error", 0.5, above=0.0)
-    max_grad_norm: float = setting("longest gradient", 0.5, above=0.0)
     log_std_init: float = setting(
         "logarithm of the action's standard deviation at the beginning",
         -1.0,
@@ -293,7 +286,6 @@ class TD3Settings(OffPolicySettings):
 class TQCSettings(SACSettings):
     """Truncated quantile critics (Kuznetsov et al. 2020, arXiv:2005.04269)."""
 
-    n_critics: int = setting("number of critics", 2, at_least=1)
     n_quantiles: int = setting("quantiles of each critic", 25, at_least=1)
     top_quantiles_to_drop: int = setting(
         "quantiles of each critic that are dropped, the largest",

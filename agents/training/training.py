@@ -55,7 +55,6 @@ def train(
     out: str | Path | None = None,
     *,
     resume: bool = False,
-    max_seconds: float | None = None,
     on_progress: Callable[[TrainingProgress], None] | None = None,
     command: str | None = None,
     evaluation_episodes: int = N_EVALUATIONS,
@@ -75,9 +74,6 @@ def train(
         Folder of the run (`run_folder`); by default nothing is written.
     resume : bool
         Continue the run in the folder.
-    max_seconds : float, optional
-        Time of learning, without that of setting up and of evaluations, after which
-        the training stops before the next rollout; it can be resumed.
     on_progress : callable, optional
         Called with the progress before each rollout. An exception of it ends the
         training.
@@ -100,7 +96,6 @@ def train(
                 run_folder.check_new(folder)
         stack.enter_context(_torch_threads(plan.threads))
         run = _Run(plan, folder, evaluation_episodes, save_seconds)
-        run.max_seconds = max_seconds
         run.on_progress = on_progress
         if folder is not None and resume:
             run.restore(folder / run_folder.CHECKPOINT)
@@ -110,14 +105,9 @@ def train(
         return run.learn()
 
 
-class _TimeIsUpError(Exception):
-    """Ends the training before a rollout."""
-
-
 class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
     """A training under way: it evaluates and saves its agent before rollouts."""
 
-    max_seconds: float | None = None
     on_progress: Callable[[TrainingProgress], None] | None = None
 
     def __init__(
@@ -138,7 +128,6 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
         self.agent = make_agent(plan, design_base(plan.settings.base, plan.task))
         self.policy: LearnedPolicy | None = None
         self.curve: list[dict[str, Any]] = []
-        self.evaluating = 0.0  # s, since learning began
         self.seconds_before = 0.0
         self.saved_at = -np.inf
         self.resumed_from: int | None = None
@@ -159,19 +148,15 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
         return min(self.curve, key=lambda one: float(one["cost"]))
 
     def learn(self) -> TrainingResult:
-        """Learn to the end, or until the time is up."""
+        """Learn to the end."""
         self.agent.set_logger(_log(self.folder))
-        self.learning_since = time.monotonic()
         left = self.plan.settings.total_steps - self.steps
-        finished = True
         try:
             if left > 0:
                 self.agent.learn(left, self, reset_num_timesteps=False)
             if not self.curve or self.curve[-1]["steps"] != self.steps:
                 self.evaluate()
             self.save()
-        except _TimeIsUpError:
-            finished = False
         except ValueError as error:
             # torch refuses to draw from a distribution that is not one
             if "invalid values" not in str(error):
@@ -179,9 +164,9 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
             raise self._diverged() from error
         finally:
             self.agent.logger.close()
-        return self._result(finished)
+        return self._result()
 
-    def _result(self, finished: bool) -> TrainingResult:
+    def _result(self) -> TrainingResult:
         policy: Any = self.policy
         if policy is None and self.folder is not None:
             # found before the run was resumed
@@ -195,7 +180,6 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
             steps=self.steps,
             lq_cost=self.held_out.lq_cost,
             seconds=self.seconds,
-            finished=finished,
             resumed_from=self.resumed_from,
         )
 
@@ -203,7 +187,7 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
         return True
 
     def _on_rollout_start(self) -> None:
-        """Evaluate and save when it is time to; stop when the time is up."""
+        """Evaluate and save when it is time to."""
         every = self.plan.settings.evaluate_every
         last = self.curve[-1]["steps"] if self.curve else None
         is_due = last is None or self.steps // every > last // every
@@ -211,12 +195,8 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
             self.evaluate()
         if self.on_progress is not None:
             self.on_progress(self._progress(is_due))
-        learning = time.monotonic() - self.learning_since - self.evaluating
-        is_up = self.max_seconds is not None and learning >= self.max_seconds
-        if is_up or time.monotonic() - self.saved_at >= self.save_seconds:
+        if time.monotonic() - self.saved_at >= self.save_seconds:
             self.save()
-        if is_up:
-            raise _TimeIsUpError
         set_deviation(self.agent, self.plan.settings)
 
     def _progress(self, evaluated: bool) -> TrainingProgress:
@@ -236,9 +216,7 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
             if not bool(weight.isfinite().all()):
                 raise self._diverged()
         policy = LearnedPolicy.from_sb3(self.agent)
-        began = time.monotonic()
         cost = self.held_out.cost(policy)
-        self.evaluating += time.monotonic() - began
         returns = [episode["r"] for episode in self.agent.ep_info_buffer or ()]
         self.curve.append(
             {

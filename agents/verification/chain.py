@@ -18,7 +18,6 @@ from agents.jobs import HERE, EngineError, JobEngine
 from agents.output import whole_folder
 from agents.verification.refusal import (
     refused_designs,
-    remark_on_damping,
     simpler_structures,
     why_refused,
 )
@@ -186,8 +185,7 @@ def examined(
     found = _measured(found, fit)
     refusals = refused_designs(found, fit)
     refused = {**found.refused, **refusals.by_design}
-    told = result(None, replace(found, refused=refused), refusals.of_all)
-    return replace(told, remark=remark_on_damping(fit))
+    return result(None, replace(found, refused=refused), refusals.of_all)
 
 
 def or_simpler(fitted: Callable[..., AutopilotResult]) -> AutopilotResult:
@@ -211,8 +209,7 @@ def or_simpler(fitted: Callable[..., AutopilotResult]) -> AutopilotResult:
                 f"{chosen} predicts best, but no autopilot is given on it"
                 f" ({result.refusal}): the model and the autopilots are {structure}'s"
             )
-            remarks = [reason, *filter(None, [simpler.remark])]
-            return replace(simpler, remark="; ".join(remarks))
+            return replace(simpler, remark=reason)
         refused.append(structure)
     if not refused:
         return result

@@ -45,21 +45,6 @@ def why_refused(fit: Fit) -> str | None:
     return None if why is None else f"{why}; run {helpful_trial(fit)}"
 
 
-def remark_on_damping(fit: Fit) -> str | None:
-    """Remark on a damping derivative that has, significantly, the sign of no ship."""
-    model = fit.model
-    equations = getattr(model.dynamics, "equations", ("v",))
-    if "v" not in equations:
-        return None
-    drawn = []
-    for ship in (model, *model.sample(60, 0)):
-        steering = _steering_of(ship)
-        if steering is None:
-            return None
-        drawn.append(steering)
-    return why_driven(drawn)
-
-
 def _steering_of(model: ShipModel) -> Steering | None:
     """A model's steering; None if it has no straight course."""
     try:
@@ -79,21 +64,6 @@ def _steers_to_other_side(fit: Fit, steering: Steering) -> str | None:
         "at low frequency the model's rudder turns the ship to the other side than in"
         " the trials"
     )
-
-
-def why_driven(drawn: Sequence[Steering]) -> str | None:
-    """Damping of the wrong sign in 97.5 % of models; None without one."""
-    dampings = ("sway damping (Y_v)", "yaw damping (N_r)")
-    for row, name in enumerate(dampings):
-        driven = [steering.A[row, row] > 0.0 for steering in drawn]
-        share = float(np.mean(driven))
-        per_cent = 100.0 * share
-        if share >= 0.975:
-            return (
-                f"its {name} has the sign of a force that drives the motion, in"
-                f" {per_cent:.0f} % of the models drawn, which no ship has"
-            )
-    return None
 
 
 def rudder_effect(trials: Sequence[Trial], model: ShipModel) -> float:

@@ -74,8 +74,8 @@ LINES = (
     ("export path-following-ppo --onnx policy.onnx", 0),
     ("export tanker --c tanker --depth 25", 0),
     (
-        f"train ppo {TASK_OF_OWN} {LEARNING} {SMALL} --randomise --from-nothing --seed"
-        " 1 --threads 1 --max-seconds 60 --out run",
+        f"train ppo {TASK_OF_OWN} {LEARNING} {SMALL} --randomise --seed"
+        " 1 --threads 1 --out run",
         0,
     ),
     ("train ppo --resume --out run", 0),

@@ -19,7 +19,6 @@ from agents.verification.closed_loop import (
 from agents.verification.refusal import (
     lost_control,
     refused_designs,
-    remark_on_damping,
     rudder_effect,
     simpler_structures,
     why_refused,
@@ -47,18 +46,6 @@ def test_steering_to_the_other_side_than_in_the_trials_is_refused(fit):
         "at low frequency the model's rudder turns the ship to the other side"
     )
     assert " to both sides" in said.partition("; run a ")[2]
-
-
-def test_a_damping_that_drives_the_motion_is_a_remark(fit):
-    wrong = replace(
-        fit.model,
-        coefficients=fit.coefficients | {"N_r": 0.004},
-        covariance=1e-4 * fit.model.covariance,
-    )
-    driven = replace(fit, model=wrong)
-    remark = remark_on_damping(driven)
-    assert "yaw damping (N_r) has the sign of a force that drives" in remark
-    assert why_refused(driven) is None
 
 
 def stood(structure, coefficients, stable=True, ran_away=0):

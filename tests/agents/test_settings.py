@@ -25,7 +25,7 @@ FREE = {"base": "none", "authority": 1.0}
         ({"ent_coef": "auto_-1"}, "expected a number or 'auto' or such as 'auto_0.1'"),
         ({"ent_coef": True}, "ent_coef: expected a number"),
         ({"target_entropy": "auto_1"}, "target_entropy: expected a number or 'auto'"),
-        ({"schedule": "liner"}, "Did you mean 'linear'"),
+        ({"activation": "rely"}, "Did you mean 'relu'"),
         ({"ships": 10, "buffer_size": 9}, "buffer_size: expected at least 10, one for"),
         ({"authority": 2.1, "base": "lq"}, "authority: expected a number > 0 and <= 2"),
         ({"authority": 0.5}, "authority: expected 1 without a base, got 0.5"),

@@ -1,11 +1,6 @@
 """Training: what is learned, evaluated, kept and resumed."""
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -264,22 +259,3 @@ def test_wrong_input_is_one_message_and_nothing_written(words, expected, tmp_pat
     assert code == 2
     assert expected in printed
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_process_that_is_killed_is_resumed(tmp_path):
-    run = tmp_path / "run"
-    words = [*COMMAND, "--total-steps", "1000000", "--out", str(run)]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "agents.cli", *words], env={**os.environ}
-    )
-    deadline = time.monotonic() + 180.0
-    while not (run / "checkpoint.pt").exists() and time.monotonic() < deadline:
-        assert process.poll() is None
-        time.sleep(0.05)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
-    words = ["train", "ppo", "--resume", "--max-seconds", "0", "--out", run]
-    code, printed = shipgym(*words)
-    assert code == 0
-    assert "resumed at step" in printed
-    assert "continue with --resume" in printed.replace("\n", " ")
