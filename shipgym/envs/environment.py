@@ -17,7 +17,6 @@ from shipgym.arrays import Flags
 from shipgym.checks import (
     check_choice,
     check_keys,
-    check_table,
     did_you_mean,
     quoted,
     unexpected,
@@ -230,7 +229,7 @@ class ShipsEnv:
                 attributes[name] = value
         state = None
         if self._begun:
-            state = self.get_state()
+            state = self._state()
         return rebuild, (type(self), self._arguments, state, attributes)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Any:
@@ -238,38 +237,23 @@ class ShipsEnv:
         return rebuild(kind, arguments, state, copy.deepcopy(attributes, memo))
 
     def _counters(self) -> dict[str, Any]:
-        """Integers that a state holds in addition to the engine's."""
+        """Integers that a copy has in addition to the engine's."""
         return {"row_keys": np.array(self._keys)}
 
-    def get_state(self) -> dict[str, Any]:
-        """Return all that `set_state` needs to continue from here.
-
-        These are the episodes, their random numbers, and the outputs of the last step.
-        Raises InputError before the first `reset`.
-        """
-        if not self._begun:
-            self._refuse_step()
+    def _state(self) -> dict[str, Any]:
+        """Episodes, their random numbers and the outputs of the last step."""
         return {
             "asked": self._asked,
             "engine": self._engine.get_state(),
             **self._counters(),
         }
 
-    def set_state(self, state: Mapping[str, Any]) -> None:
-        """Continue from the `get_state` of an environment with the same arguments.
-
-        Raises InputError for a state of another task, version, ship or number of ships,
-        or one with a number that is not finite; nothing is changed then.
-        """
-        names = ("asked", "engine", *self._counters())
-        check_table(state, "state", names, required=names)
-        settings = self.task.definition.settings
-        asked = check_table(state["asked"], "state: asked", settings)
-        engine = self._engine_for(asked)
-        engine.set_state(state["engine"])
-        # nothing is refused from here on
-        self._asked = dict(asked)
+    def _continue(self, state: Mapping[str, Any]) -> None:
+        """Continue from the state of an environment with the same arguments."""
+        self._asked = dict(state["asked"])
         self._begun = True
+        engine = self._engine_for(self._asked)
+        engine.set_state(state["engine"])
         self._use(engine)
         self._recall(state)
         for artist in self._artists:
@@ -286,32 +270,19 @@ class ShipsEnv:
             return own
         return own.rebuild(task=self.task.changed(**asked))
 
-    def _take(self, options: Mapping[str, Any] | None, *more: str) -> Any:
-        """Apply the options of a reset until the next one; return a state among them.
+    def _take(self, options: Mapping[str, Any] | None, *more: str) -> None:
+        """Apply the options of a reset until the next one.
 
         Raises InputError for other options, or a value that does not fit.
         """
-        asked = {}
-        for name, value in (options or {}).items():
-            if value is not None:
-                asked[name] = value
-        known = [*self.task.definition.settings, "state", *more]
-        check_keys(asked, known, "options")
-
-        state = asked.pop("state", None)
-        if state is not None:
-            if asked:
-                raise InputError(
-                    "options: expected 'state' alone, got it together with"
-                    f" {sorted(asked)}"
-                )
-            return state
+        given = (options or {}).items()
+        asked = {name: value for name, value in given if value is not None}
+        check_keys(asked, [*self.task.definition.settings, *more], "options")
         for name in more:
             asked.pop(name, None)
         if asked or self._asked:
             self._use(self._engine_for(asked))
             self._asked = asked
-        return None
 
     def _refuse_step(self) -> NoReturn:
         """Raise the InputError of an environment that was not reset, or is closed."""
@@ -362,5 +333,5 @@ def rebuild(
     env = kind(**arguments)
     vars(env).update(attributes)
     if state is not None:
-        env.set_state(state)
+        env._continue(state)
     return env

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_table, shown
 from shipgym.engine.envelope import Four, Triangle
 from shipgym.engine.episode_program import EpisodeProgram
 from shipgym.engine.lane_records import Rules
@@ -323,46 +322,11 @@ class Lanes:
     def get_state(self) -> dict[str, Any]:
         """Return all that `set_state` needs to continue from here, copies by name."""
         return {
-            "made_for": self._made_for(),
             "states": self._states.copy(),
             "random": self._random.copy(),
             "ships": self._ships.copy(),
             "outputs": self.outputs.memory.copy(),
         }
-
-    def _made_for(self) -> dict[str, Any]:
-        """What a state fits."""
-        rows = []
-        for name, record in self.program.state_rows.rows.items():
-            rows += [f"{name}.{path}" for path in record.present]
-        return {
-            "task": self.task.name,
-            "model": self.model.name,
-            "num_envs": self.num_envs,
-            "rows": rows,
-            "size": self._states.shape[1],
-        }
-
-    def check_state(self, state: Mapping[str, Any]) -> None:
-        """Refuse a state of an engine with other arguments.
-
-        InputError names the difference.
-        """
-        names = ("made_for", "states", "random", "ships", "outputs")
-        check_table(state, "state", names, required=names)
-        found = check_table(state["made_for"], "state: made_for")
-        for name, expected in self._made_for().items():
-            if found.get(name) != expected:
-                raise InputError(
-                    f"state: {name}: expected {shown(expected)}, got"
-                    f" {shown(found.get(name))}: a state fits an environment made by"
-                    " the same arguments in the same version"
-                )
-        same_ship = np.array_equal(state["ships"], self._ships, equal_nan=True)
-        if self.program.shared and not same_ship:
-            raise InputError(
-                f"state: expected that of this {self.model.name!r}, got another ship's"
-            )
 
 
 def _first_entries(rows: Sequence[int]) -> NDArray[np.int64]:

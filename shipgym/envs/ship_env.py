@@ -118,8 +118,8 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             Fixes this episode and all that follow it.
         options : dict, optional
             Until the next reset: settings of the task by their names, such as
-            `waypoints` of the path, or of several. Or, alone, `state`: go on from what
-            `get_state` gave. Observations keep the scales of the environment.
+            `waypoints` of the path, or of several. Observations keep the scales of the
+            environment.
 
         Returns
         -------
@@ -129,17 +129,15 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         """
         super().reset(seed=seed)
         episodes = self._engine.episodes + np.uint64(1)
-        state = self._take(options) if options or self._asked else None
-        if state is not None:
-            self.set_state(state)
-        else:
-            if seed is not None or self._keys is None:
-                self._keys = self._drawn_keys()
-                episodes[:] = 0
-            self._begun = True
-            self._note_end()
-            self._engine.begin(self._keys, episodes)
-            self._draw_and_show()
+        if options or self._asked:
+            self._take(options)
+        if seed is not None or self._keys is None:
+            self._keys = self._drawn_keys()
+            episodes[:] = 0
+        self._begun = True
+        self._note_end()
+        self._engine.begin(self._keys, episodes)
+        self._draw_and_show()
         numbers = self._outcomes[ANSWER_OUTCOMES:].tolist()
         return self._observation.copy(), self._info(numbers)
 

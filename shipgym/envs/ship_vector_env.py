@@ -1,7 +1,6 @@
 """Many ships under a task as one of Gymnasium's vector environments."""
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from math import isfinite
 from pathlib import Path
 from typing import Any, NoReturn
@@ -21,7 +20,6 @@ from shipgym.envs.environment import (
     given_orders,
 )
 from shipgym.envs.outputs import named_rows
-from shipgym.envs.rows import FIXED, Row
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.tasks.task import VECTOR_OPTIONS
@@ -51,8 +49,6 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         When the next episode of a row begins.
     threads : int
         Number of threads that share the rows; the results do not depend on it.
-    max_episode_steps : int, optional
-        Gymnasium's name of `episode_steps`.
     **options
         As for the single environment.
     """
@@ -66,18 +62,10 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         allow_unstable: bool = False,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int = 1,
-        max_episode_steps: int | None = None,
         **options: Any,
     ) -> None:
         arguments = locals()
         mode = _mode(autoreset_mode)
-        if max_episode_steps is not None:
-            steps = options.setdefault("episode_steps", max_episode_steps)
-            if steps != max_episode_steps:
-                raise InputError(
-                    f"max_episode_steps: expected episode_steps, {steps!r}, or none of"
-                    f" the two, got {max_episode_steps!r}"
-                )
         observation_space, action_space = self._make(
             arguments, VECTOR_OPTIONS, ["rgb_array"]
         )
@@ -145,11 +133,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         super().reset(seed=seed if isinstance(seed, int) else None)
         mask = self._mask(options)
         episodes = self._engine.episodes + np.uint64(1)
-        state = self._take(options, "reset_mask") if mask.all() else None
-        if state is not None:
-            self.set_state(state)
-            return self._engine.outputs.observations, self._infos()
-
+        if mask.all():
+            self._take(options, "reset_mask")
         engine = self._engine
         self._keys, episodes = self._next_episodes(seed, mask, episodes)
         shown_before = engine.outputs
@@ -313,47 +298,6 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         None in course keeping.
         """
         return self._engine.waypoints(row)
-
-    @cached_property
-    def rows(self) -> tuple[Row, ...]:
-        """Rows, as the single environments they stand for."""
-        return tuple(Row(self, number) for number in range(self.num_envs))
-
-    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """Call a method of each row, or get an attribute (see `Row`).
-
-        As Gymnasium's SyncVectorEnv does.
-        """
-        results = []
-        for row in self.rows:
-            found = getattr(row, name)
-            results.append(found(*args, **kwargs) if callable(found) else found)
-        return tuple(results)
-
-    def get_attr(self, name: str) -> tuple[Any, ...]:
-        """Attribute of each row, or one of `set_attr` (see `Row`)."""
-        return tuple(getattr(row, name) for row in self.rows)
-
-    def set_attr(self, name: str, values: Any) -> None:
-        """Store a value for each row under a name of your own.
-
-        A list or tuple has one for each row. Raises InputError for another number of
-        them, and for an attribute that is fixed when the environment is made.
-        """
-        if name in FIXED:
-            raise InputError(
-                f"set_attr: expected a name of your own, got {name!r}, which is fixed"
-                " when the ships are made; make a new environment with another argument"
-            )
-        if not isinstance(values, list | tuple):
-            values = [values] * self.num_envs
-        if len(values) != self.num_envs:
-            raise InputError(
-                f"set_attr: expected a value for each of {self.num_envs} rows, got"
-                f" {len(values)}"
-            )
-        for row, value in zip(self.rows, values, strict=True):
-            setattr(row, name, value)
 
     def render(self) -> tuple[Any, ...] | None:
         """Picture of each row, uint8 arrays of shape (600, 600, 3).

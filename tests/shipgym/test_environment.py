@@ -86,67 +86,6 @@ def test_copies_step_identically_and_on_their_own(make, options, again):
 
 
 @pytest.mark.parametrize("make", [one, many])
-def test_a_state_is_gone_back_to(make):
-    env = make(episode_steps=40).unwrapped
-    env.reset(seed=2)
-    sailed(env, 15)
-    state = env.get_state()
-    ours = sailed(env, swing=0.9)
-    env.set_state(state)
-    same(ours, sailed(env, swing=0.9))
-    other = make(episode_steps=40).unwrapped
-    other.reset(options={"state": state})
-    same(ours, sailed(other, swing=0.9))
-
-
-def test_states_that_do_not_fit_are_refused_and_change_nothing():
-    env = one().unwrapped
-    with pytest.raises(InputError, match="no episode has begun"):
-        env.get_state()
-    env.reset(seed=0)
-    state, before = env.get_state(), env.physical_state()
-    before = env.physical_state()
-    course, tanker, short, vector = (
-        one(COURSE),
-        one(model="mariner-tls-svm"),
-        one(waypoints=HOOK),
-        many(),
-    )
-    for other in (course, tanker, short, vector):
-        other.reset(seed=0)
-    states = [other.unwrapped.get_state() for other in (course, tanker, short, vector)]
-    for given, message in [
-        (
-            states[0],
-            (
-                "state: task: expected 'PathFollowing', got 'CourseKeeping': .*"
-                " same version"
-            ),
-        ),
-        (states[1], "state: model: expected 'mariner', got 'mariner-tls-svm'"),
-        (states[2], "state: size: expected"),
-        (states[3], "state: unknown key 'some_over'"),
-        (
-            {**state, "engine": {**state["engine"], "made_for": 3}},
-            "state: made_for: expected a table",
-        ),
-        ({**state, "asked": "x"}, "state: asked: expected a table"),
-        ({}, "state: field 'asked' is missing"),
-        (3, "state: expected a table"),
-    ]:
-        with pytest.raises(InputError, match=message):
-            env.set_state(given)
-        with pytest.raises(InputError, match=message):
-            env.reset(options={"state": given})
-    with pytest.raises(
-        InputError,
-        match=r"expected 'state' alone, got it together with \['waypoints'\]",
-    ):
-        env.reset(options={"state": state, "waypoints": HOOK})
-    assert env.physical_state() == before
-
-
-@pytest.mark.parametrize("make", [one, many])
 def test_waypoints_of_a_reset_hold_until_the_next(make):
     env = make().unwrapped
     path = env.waypoints if make is many else lambda: env.waypoints
@@ -169,18 +108,6 @@ def test_libraries_read_the_steps_of_an_episode():
     assert one().spec.max_episode_steps == 1500
     assert one(episode_steps=50).spec.max_episode_steps == 50
     assert TimeAwareObservation(one(COURSE)).reset(seed=0)[0][-1] == 0.0
-    env = many(max_episode_steps=4)
-    env.reset(seed=0)
-    assert [env.step(np.zeros((3, 1), np.float32))[3].all() for _ in range(4)] == [
-        False,
-        False,
-        False,
-        True,
-    ]
-    with pytest.raises(
-        InputError, match=r"max_episode_steps: expected episode_steps, 5, .* got 4"
-    ):
-        many(max_episode_steps=4, episode_steps=5)
 
 
 def test_an_unknown_keyword_is_a_type_error_too():

@@ -205,7 +205,7 @@ WRONG = {
             "Settings.bonus: default: expected",
         ),
         ("    bonus: tuple[float, ...] = (1.0,)", "Settings.bonus: expected an array"),
-        ("    state: float = 0.5", "Settings.state: expected a name of its own"),
+        ("    task: float = 0.5", "Settings.task: expected a name of its own"),
     ],
     "    noise: Anno": [
         ("    nearest_east: Anno", "Observation: .* got two fields 'nearest_east'"),
