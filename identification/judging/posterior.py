@@ -18,8 +18,8 @@ from identification.judging.sampling import (
     sample,
 )
 from identification.judging.uncertainty import Uncertainty
-from identification.models.sailed import CoefficientPrior
-from identification.models.whole_trials import WholeTrials
+from identification.models.sailed import CoefficientPrior, Sailed
+from identification.models.segments import compared_channels, cut
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.manoeuvres.execution import usual_rudder
@@ -92,7 +92,11 @@ def with_posterior(
     """
     check_trials(trials)
     bare = replace(model, covariance=None, draws=None)
-    whole = WholeTrials(bare, trials, prior)
+    channels = compared_channels(bare, trials)
+    step = 0.2  # ship lengths, from sample to sample and of the integration
+    whole_trials = 1e9  # lengths of a part at most
+    parts = cut(trials, bare, channels, whole_trials, False, interval=step, coarse=True)
+    whole = Sailed(bare, channels, prior, parts)
     start = _point_of(model, prior)
     scales = whole.scales(start)
     if not np.isfinite(scales).all():
@@ -153,7 +157,8 @@ def coarsened(
         own = posterior.mode(start)
         left_out = []
         for trial in range(len(trials)):
-            mode = posterior.mode(own.point, kept=of_parts != trial)
+            others = np.flatnonzero(of_parts != trial)
+            mode = posterior.mode(own.point, others)
             left_out.append(posterior.model(mode))
         error = model_error(posterior.model(own), left_out, trials)
         factor: float = error["factor"]
@@ -228,7 +233,7 @@ def _walkers(
     return np.asarray(chosen)
 
 
-def contradictions(whole: WholeTrials, point: Floats) -> list[str]:
+def contradictions(whole: Sailed, point: Floats) -> list[str]:
     """A remark where the trials contradict the prior, on what is farthest off.
 
     `point` is the most probable one by the scatter of the errors alone: where the

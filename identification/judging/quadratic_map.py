@@ -38,17 +38,16 @@ class QuadraticMap:
 
 def quadratic_map(
     mode: Floats,
-    information: Floats,
     jacobian: Floats,
     errors: Callable[[Floats], Floats],
 ) -> QuadraticMap:
     """The map about a mode, with unit normal prior.
 
-    `information` is that of the data, shape (n_parameters, n_parameters), `jacobian`
-    that of the errors at the mode; `errors` gives them at points, shape (n_rows,
-    n_points), in units of which the squares are the data's part of the density.
+    `jacobian` is that of the errors at the mode; `errors` gives them at points, shape
+    (n_rows, n_points), in units of which the squares are the data's part of the
+    density.
     """
-    determined, directions = np.linalg.eigh(information)
+    determined, directions = np.linalg.eigh(jacobian.T @ jacobian)
     axes = directions / np.sqrt(np.maximum(determined, 0.0) + 1.0)
     along = jacobian @ axes
 

@@ -1,39 +1,56 @@
 """The coefficients of the MMG form that trials and prior make most probable.
 
-How much narrower the prior is made, the trials decide, each predicted from the others.
+Compared are segments back to back, each started from the smoothed measurement. How much
+narrower the prior is made, the trials decide, each predicted from the others.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from identification.arrays import by_name
 from identification.models.hull_formulas import YOSHIMURA
+from identification.models.least_squares import Linearised
 from identification.models.mmg_prior import MMGPrior, mmg_prior
-from identification.models.posterior import Estimate, HeldOutError, Posterior
 from identification.models.prior_knowledge import PriorKnowledge
+from identification.models.sailed import (
+    CoefficientPrior,
+    Sailed,
+    covariance_of,
+    with_prior,
+)
+from identification.models.segments import compared_channels, cut
 from shipgym import ShipModel, Trial
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats, Integers
 from shipgym.ships.mmg import IDENTIFIED
-
-
-class _Candidate(NamedTuple):
-    """An estimate by one strength of the prior, and how it predicts what it omits."""
-
-    estimate: Estimate
-    held_out: HeldOutError
 
 
 @dataclass(frozen=True, eq=False)
 class MMGFit:
-    """The MMG form of greatest probability."""
+    """The MMG form of greatest probability by one strength of the prior."""
 
-    model: ShipModel  # with its covariance
-    report: dict[str, Any]  # for the provenance
-    posterior: Posterior
-    estimate: Estimate
+    segments: Sailed
+    z: Floats  # standard deviations of the prior from its mean, shape (41,)
+    scales: Floats  # of the residuals by channel
+    strength: float  # of the prior
+    data: Linearised  # errors in these scales at z
+    evaluations: int
+    error: float = np.nan  # of segments held out, root mean square
+    factor: float = 1.0  # on the standard errors, at which these are of size one
+    report: dict[str, Any] = field(default_factory=dict)  # for the provenance
+
+    @property
+    def prior(self) -> CoefficientPrior:
+        """The prior of the coefficients."""
+        return self.segments.prior
+
+    @property
+    def model(self) -> ShipModel:
+        """The model, its covariance widened by the errors held out."""
+        covariance = covariance_of(self.data.jacobian)
+        return self.segments.model(self.z, self.factor**2 * covariance)
 
     @property
     def free_coefficients(self) -> int:
@@ -42,16 +59,60 @@ class MMGFit:
         The trace of the resolution: 1 for what the prior says nothing of, 0 for what
         the trials say nothing of.
         """
-        variances = np.linalg.eigvalsh(self.estimate.covariance)
-        of_trials = 1.0 / variances - 1.0
-        of_prior = self.estimate.strength**2
-        resolved = of_trials / (of_trials + of_prior)
+        of_trials = np.linalg.svd(self.data.jacobian, compute_uv=False) ** 2
+        resolved = of_trials / (of_trials + self.strength**2)
         return max(round(float(resolved.sum())), 1)
 
     def without(self, trials: Sequence[int]) -> ShipModel:
         """The model of the other trials, by their places."""
-        z = self.posterior.without_trials(trials, self.estimate)
-        return self.posterior.model(z)
+        held = np.isin(self.segments.of_trials, trials)
+        z, _ = self._without(held)
+        return self.segments.model(z)
+
+    def held_out(self, scales: Floats) -> "MMGFit":
+        """With the error of each group of segments by a fit of the others.
+
+        The error is in the scales given; the factor makes the errors held out, by those
+        that the covariance of the others' fit and the scatter of the residuals lead to
+        expect, one on average; at least 1.
+        """
+        groups = held_out_groups(self.segments.of_trials)
+        mean_squares = []
+        excess: float = 0.0
+        expected: float = 0.0
+        for group in np.unique(groups):
+            held = groups == group
+            z, covariance = self._without(held)
+            which = np.flatnonzero(held)
+            errors, slopes = self.segments.linearised(z, self.scales, which)
+            n_errors = self.segments.n_errors(which) * len(scales)
+            in_scales = errors.reshape(-1, len(scales)) * (self.scales / scales)
+            mean_squares.append(np.sum(in_scales**2) / n_errors)
+            excess += float(errors @ errors) - n_errors
+            expected += float(np.sum((slopes @ covariance) * slopes))
+        return replace(
+            self,
+            error=float(np.sqrt(np.mean(mean_squares))),
+            factor=float(np.sqrt(max(excess / expected, 1.0))),
+        )
+
+    def _without(self, held: Flags) -> tuple[Floats, Floats]:
+        """Coefficients without some segments, and their covariance.
+
+        From those of all segments two Gauss-Newton steps come near enough.
+        """
+        sizes = [part.measured[1:].size for part in self.segments.parts]
+        kept = ~np.repeat(held, sizes)
+        data = Linearised(self.data.residuals[kept], self.data.jacobian[kept])
+        z = self.z + self._step(data, self.z)
+        data = self.segments.linearised(z, self.scales, np.flatnonzero(~held))
+        return z + self._step(data, z), covariance_of(data.jacobian)
+
+    def _step(self, data: Linearised, z: Floats) -> Floats:
+        """A Gauss-Newton step."""
+        residuals, jacobian = with_prior(data, z, self.strength)
+        step = np.linalg.solve(jacobian.T @ jacobian, jacobian.T @ residuals)
+        return np.asarray(-step)
 
 
 def fit_mmg(blank: ShipModel, trials: Sequence[Trial], asked: PriorKnowledge) -> MMGFit:
@@ -63,90 +124,76 @@ def fit_mmg(blank: ShipModel, trials: Sequence[Trial], asked: PriorKnowledge) ->
     tenth of the least. The report is for the provenance.
     """
     prior = mmg_prior(asked.source or YOSHIMURA, blank.particulars)
-    ship = replace(blank, particulars=prior.ship)
-    posterior = Posterior(ship, trials, prior)
-    candidates = _candidates(posterior, _strengths(asked))
-    errors = [candidate.held_out.error for candidate in candidates]
-    best = strongest_as_good(errors)
-    chosen = candidates[best]
-
-    model = _chosen_model(posterior, chosen)
-    report = _report(posterior, candidates, chosen)
-    return MMGFit(model, report, posterior, chosen.estimate)
-
-
-def _chosen_model(posterior: Posterior, chosen: _Candidate) -> ShipModel:
-    """The model of an estimate, its covariance widened by the errors held out."""
-    estimate, held_out = chosen
-    widened = held_out.factor**2 * estimate.covariance
-    model = posterior.model(estimate.z)
-    covariance = _coefficient_covariance(posterior.mmg_prior, widened)
-    return replace(model, covariance=covariance)
-
-
-def _strengths(asked: PriorKnowledge) -> tuple[float, ...]:
-    """Strengths of the prior to choose from, or the one that was given."""
-    if asked.strength is None:
-        return 1.0, 2.0, 3.0
-    return (asked.strength,)
-
-
-def _candidates(posterior: Posterior, strengths: Sequence[float]) -> list[_Candidate]:
-    """Estimates by rising strength, each begun where the one before it ended."""
-    estimates = list[Estimate]()
+    ship = replace(blank, particulars=prior.ship, coefficients=prior.mean)
+    segments = _segments(ship, trials, prior)
+    strengths = (1.0, 2.0, 3.0) if asked.strength is None else (asked.strength,)
+    fits = list[MMGFit]()
     z = np.zeros(len(IDENTIFIED))
     for strength in strengths:
-        estimate = posterior.most_probable(z, strength)
-        estimates.append(estimate)
-        z = estimate.z
-
+        fit = _fit(segments, z, strength)
+        fits.append(fit)
+        z = fit.z
     # errors are compared in the same scales
-    scales = estimates[0].scales
-    candidates = []
-    for estimate in estimates:
-        held_out = posterior.held_out(estimate, scales)
-        candidates.append(_Candidate(estimate, held_out))
-    return candidates
+    fits = [fit.held_out(fits[0].scales) for fit in fits]
+    largest = 1.1 * min(fit.error for fit in fits)
+    *_, chosen = (fit for fit in fits if fit.error <= largest)
+    return replace(chosen, report=_prior_report(prior) | _report(fits, chosen))
 
 
-def strongest_as_good(errors: list[float]) -> int:
-    """The last of errors by strength that is within a tenth of the least."""
-    largest = 1.1 * min(errors)
-    as_good = [k for k, error in enumerate(errors) if error <= largest]
-    return as_good[-1]
+def _segments(ship: ShipModel, trials: Sequence[Trial], prior: MMGPrior) -> Sailed:
+    """Segments of the trials, and the prior of all coefficients."""
+    names = list(ship.coefficients)
+    root = np.zeros((len(names), len(IDENTIFIED)))
+    root[: len(IDENTIFIED)] = np.diag(prior.deviation)
+    mean = np.array([prior.mean[name] for name in names])
+    channels = compared_channels(ship, trials)
+    lengths = 1.7  # of a segment, ship lengths at service speed
+    step = 0.067  # between the samples that are compared
+    parts = cut(trials, ship, channels, lengths, staggered=False, interval=step)
+    return Sailed(ship, channels, CoefficientPrior(prior.source, mean, root), parts)
 
 
-def _coefficient_covariance(prior: MMGPrior, covariance: Floats) -> Floats:
-    """Covariance of all coefficients from that of z; 0 of those known beforehand."""
-    n_coefficients = len(prior.mean)
-    whole = np.zeros((n_coefficients, n_coefficients))
-    identified = slice(len(IDENTIFIED))
-    units = np.outer(prior.deviation, prior.deviation)
-    whole[identified, identified] = covariance * units
-    return whole
+def _fit(segments: Sailed, start: Floats, strength: float) -> MMGFit:
+    """Fit all segments, the scales of the residuals renewed between rounds.
+
+    From the mean of the prior, of which z is 0, there is a round more.
+    """
+    tolerances = (1e-2, 1e-4) if start.any() else (1e-2, 1e-2, 1e-4)
+    z, evaluations = start, 0
+    for tolerance in tolerances:
+        scales = segments.scales(z)
+        lost = ~np.isfinite(scales)
+        scales[lost] = 1e2 * segments.floors[lost]
+        fit = segments.most_probable(z, scales, strength, tolerance)
+        z = fit.x
+        evaluations += fit.nfev
+    data = segments.linearised(z, scales)
+    return MMGFit(segments, z, scales, strength, data, evaluations)
 
 
-def _report(
-    posterior: Posterior, candidates: Sequence[_Candidate], chosen: _Candidate
-) -> dict[str, Any]:
+def held_out_groups(trial: Integers) -> Integers:
+    """Group of each segment, held out together: a trial, of many every fifth one.
+
+    `trial`: that of each segment. Of a single trial a third.
+    """
+    several = trial.max() > trial.min()
+    if several:
+        return trial % 5
+    return np.arange(len(trial)) * 3 // len(trial)
+
+
+def _report(fits: Sequence[MMGFit], best: MMGFit) -> dict[str, Any]:
     """For the provenance."""
-    errors = dict[str, float]()
-    evaluations = 0
-    for estimate, held_out in candidates:
-        errors[f"{estimate.strength:g}"] = held_out.error
-        evaluations += estimate.evaluations
-
-    best = chosen.estimate
-    return _prior_report(posterior.mmg_prior) | {
+    return {
         "prior_strength": best.strength,
-        "errors_held_out": errors,
+        "errors_held_out": {f"{fit.strength:g}": fit.error for fit in fits},
         "model_error": {
-            "factor": chosen.held_out.factor,
+            "factor": best.factor,
             "how": "simulated segments of trials left out in turn",
         },
-        "segments": len(posterior.segments),
-        "evaluations": evaluations,
-        "residual_rms": by_name(posterior.channels, best.scales),
+        "segments": len(best.segments.parts),
+        "evaluations": sum(fit.evaluations for fit in fits),
+        "residual_rms": by_name(best.segments.channels, best.scales),
         "deviations_from_prior": by_name(IDENTIFIED, best.z.round(3)),
     }
 

@@ -82,12 +82,14 @@ def cut(
     lengths: float,
     staggered: bool,
     interval: float = 0.0,
+    coarse: bool = False,
 ) -> list[Segment]:
     """Cut trials into segments; staggered, again from half a segment later on.
 
     A gap in time ends a segment. A segment is the time to sail so many ship `lengths`
     at service speed; it starts from the smoothed state. Compared are samples at least
-    an `interval` apart, in ship lengths; where it is 0, all.
+    an `interval` apart, in ship lengths; where it is 0, all. Coarse ones are integrated
+    in steps as long as that.
     """
     duration = lengths * model.travel_time
     least_step = interval * model.travel_time
@@ -97,7 +99,8 @@ def cut(
         for piece in between_gaps(trial, model.particulars):
             recorded = _recorded(index, piece, model)
             for rows in _segment_rows(piece.t, duration, shifts, least_step):
-                segment = _segment(recorded, rows, channels, model)
+                longest_step = least_step if coarse else None
+                segment = _segment(recorded, rows, channels, model, longest_step)
                 segments.append(segment)
     return segments
 
@@ -181,12 +184,20 @@ def smoothed_states(trial: Trial, model: ShipModel) -> Floats:
 
 
 def _segment(
-    recorded: _Recorded, rows: slice, channels: Sequence[str], model: ShipModel
+    recorded: _Recorded,
+    rows: slice,
+    channels: Sequence[str],
+    model: ShipModel,
+    longest_step: float | None,
 ) -> Segment:
     trial = recorded.trial
     t = trial.t[rows]
-    longest_step = LONGEST_STEP * model.travel_time
-    grid = _grid(t, longest_step, recorded.rudder.corners)
+    corners = recorded.rudder.corners
+    if longest_step is None:
+        longest_step = LONGEST_STEP * model.travel_time
+    else:
+        corners = corners[:0]
+    grid = _grid(t, longest_step, corners)
     samples = np.full(len(grid), -1)
     sampled = np.searchsorted(grid, t)
     samples[sampled] = np.arange(len(t))

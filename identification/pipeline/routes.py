@@ -241,7 +241,7 @@ class SimulationFit:
         if asked.by_sampling:
             from identification.judging.posterior import with_posterior
 
-            prior = self.fit.posterior.prior
+            prior = self.fit.prior
             model, posterior = with_posterior(model, problem.used, prior, asked)
             report |= {"uncertainty": "posterior", "posterior": posterior}
         elif asked.model_error and self.stable:
