@@ -2,8 +2,7 @@
 
 81 steady conditions of drift, rudder and propeller loading, without yaw or
 acceleration: what they tell is the hull's response to drift and the rudder's force, not
-inertia or damping of yaw, so the tables of `identification.models.forces`, which
-begin with inertia, do not apply; the estimator and the reduction do.
+inertia or damping of yaw.
 """
 
 from __future__ import annotations
@@ -208,6 +207,7 @@ def run(data: Data) -> Section:
     rows = []
     for force, of_force in found.items():
         steps = of_force.reduction.path
+        both = combined(tests, force, of_force.reduction.terms)
         counts = (len(TERMS[force]), of_force.full.rank_, len(of_force.reduction.terms))
         for (name, score), count in zip(of_force.held_out.items(), counts, strict=True):
             fitted = (
@@ -220,30 +220,21 @@ def run(data: Data) -> Section:
                     str(count),
                     number(fitted, 4) if name != "tls-svm" else "-",
                     number(score, 4),
+                    number(both, 4) if name.endswith("reduced") else "-",
                 ]
             )
-    coefficients = [
-        [
-            force,
-            name,
-            f"{1e5 * value:.0f}",
-            f"{100 * of_force.reduction.path[-1].relative_errors[name]:.0f} %",
-        ]
-        for force, of_force in found.items()
-        for name, value in of_force.reduction.coefficients.items()
-    ]
     text = TEXT.format(
         count=len(tests.d),
-        fits=table(["force", "fit", "terms or rank", "R2 of all", "R2 held out"], rows),
-        coefficients=table(
-            ["force", "term", "coefficient, 1e-5", "standard error"], coefficients
-        ),
-        combined=table(
-            ["force", "R2 of the tests with drift and rudder"],
+        fits=table(
             [
-                [force, number(combined(tests, force, of.reduction.terms), 4)]
-                for force, of in found.items()
+                "force",
+                "fit",
+                "terms or rank",
+                "R2 of all",
+                "R2 held out",
+                "R2 of drift with rudder",
             ],
+            rows,
         ),
     )
     return Section(
@@ -276,23 +267,14 @@ def _painter(tests: Captive, found: dict[str, Found]) -> Callable[[Any], None]:
 
 
 TEXT = """
-{count} different steady conditions (some of the 81 listed are repeated) at a constant
-shaft speed: rudder at six speeds, drift, drift with rudder. Terms: powers of v' =
--sin(drift), rudder d and loading n = U0/U; forces by rho L^2 U0^2/2 with one U0 for
-all, as the balance measures them. Uncertain or collinear terms are dropped one by one
-as long as the held-out tests (five folds with tests of every kind) are explained as
-well.
+{count} different steady conditions at a constant shaft speed: rudder at six speeds,
+drift, drift with rudder. Terms: powers of v' = -sin(drift), rudder d and loading n =
+U0/U; forces by rho L^2 U0^2/2 with one U0 for all. Uncertain or collinear terms are
+dropped one by one as long as the held-out tests (five folds with tests of every kind)
+are explained as well. In the last column the tests with drift and rudder are predicted
+from those with one of them alone.
 
 {fits}
-
-The reduced models:
-
-{coefficients}
-
-A harder test: the same terms are fitted to rudder tests and drift tests alone, and the
-tests with both are predicted:
-
-{combined}
 
 **Limits.** Without yaw or acceleration the tests identify neither inertia nor the
 damping of yaw; the cross terms of rudder and drift appear only in the tests with both.

@@ -22,12 +22,14 @@ LEAST_SPEED = 0.1  # m/s; slower, the ship is taken to be at rest
 MEASURES = ("u, m/s", "v, m/s", "r, deg/s", "heading, deg")
 
 REPAIRED = Preprocessing(repair=True)
-TLS: dict[str, Any] = {"structure": "cubic", "method": "tls-svm"}
 METHODS: dict[str, dict[str, Any]] = {
     "least squares, nomoto": {"structure": "nomoto", "method": "ls"},
     "least squares, cubic": {"structure": "cubic", "method": "ls"},
-    "tls-svm, cubic": TLS,
-    "tls-svm, cubic, repaired": {**TLS, "preprocessing": REPAIRED},
+    "tls-svm, cubic, repaired": {
+        "structure": "cubic",
+        "method": "tls-svm",
+        "preprocessing": REPAIRED,
+    },
     "tls-svm, grey box of the tanker, repaired": {
         "structure": "grey-box",
         "method": "tls-svm",
@@ -63,15 +65,15 @@ def errors(model: ShipModel, trial: Trial) -> Floats:
 
 
 def study(ship: MeasuredShip, settings: dict[str, Any]) -> dict[str, Any]:
-    """Each zigzag predicted from the five others, from rest and under way."""
+    """Each zigzag predicted from the five others."""
     names = [name for name in ship.runs if name.startswith("zigzag")]
-    found: dict[str, Any] = {"rest": [], "way": [], "unstable": 0, "models": {}}
+    found: dict[str, Any] = {"way": [], "unstable": 0, "models": {}}
     for held in names:
         runs = [ship.runs[name] for name in names if name != held]
         result = identify(
             runs, particulars=ship.particulars, steering=ship.steering, **settings
         )
-        _compare(found, result.model, ship.runs[held])
+        found["way"].append(errors(result.model, under_way(ship.runs[held])))
         found["unstable"] += not result.stable
         found["models"][held] = result.model
     return found
@@ -83,13 +85,12 @@ def bare_study(ship: MeasuredShip) -> dict[str, Any]:
     shaft = max(float(ship.runs[name]["n"].max()) for name in names)
     model = fastest(ship, shaft)
     found: dict[str, Any] = {
-        "rest": [],
         "way": [],
         "unstable": 0,
         "models": dict.fromkeys(names, model),
     }
     for name in names:
-        _compare(found, model, ship.runs[name])
+        found["way"].append(errors(model, under_way(ship.runs[name])))
     return found
 
 
@@ -103,11 +104,6 @@ def fastest(ship: MeasuredShip, shaft: float) -> ShipModel:
     )
 
 
-def _compare(found: dict[str, Any], model: ShipModel, trial: Trial) -> None:
-    found["rest"].append(errors(model, trial))
-    found["way"].append(errors(model, under_way(trial)))
-
-
 def run(data: Data) -> Section:
     """The case."""
     ship = data.ship(SHIP, EVERY)
@@ -119,11 +115,7 @@ def run(data: Data) -> Section:
             ["fit", *MEASURES, "ran away", "refused by the guard"],
             [_row(n, f) for n, f in found.items()],
         ),
-        rest=table(
-            ["fit", *MEASURES], [[n, *_cells(f["rest"])] for n, f in found.items()]
-        ),
         size=table(["", *MEASURES], [["root mean square of the runs", *_size(ship)]]),
-        repaired=_repaired(ship),
     )
     return Section(
         "Esso Osaka, zigzags from rest in wind",
@@ -173,23 +165,6 @@ def _size(ship: MeasuredShip) -> list[str]:
     ]
 
 
-def _repaired(ship: MeasuredShip) -> str:
-    """How many values of u the repair replaces, by run."""
-    from identification.samples.preprocess import repaired
-
-    counts = {
-        name: dict(repaired(trial).repaired)
-        for name, trial in ship.runs.items()
-        if name.startswith("zigzag")
-    }
-    told = [
-        f"{name}: {', '.join(f'{c} {n}' for c, n in count.items())}"
-        for name, count in counts.items()
-        if count
-    ]
-    return "; ".join(told) or "none"
-
-
 def _painter(ship: MeasuredShip, found: dict[str, Any]) -> Callable[[Any], None]:
     names = [name for name in ship.runs if name.startswith("zigzag")][-2:]
 
@@ -227,28 +202,21 @@ def _painter(ship: MeasuredShip, found: dict[str, Any]) -> Callable[[Any], None]
 
 TEXT = """
 Each of the six zigzags is predicted from the five others, open loop from measured
-rudder and shaft speed; 5 Hz. The ship is at rest at first; the structure `cubic` and
-the grey box include the shaft speed and so can start from rest. From when she has way
+rudder and shaft speed at 5 Hz. The ship is at rest at first; `cubic`, the grey box and
+`mmg` include the shaft speed and so can start from rest. Errors from when she has way
 on (0.1 m/s):
 
 {way}
 
-The whole runs, from rest:
-
-{rest}
-
-For comparison, the size of the motion (under way):
+For comparison, the size of the motion:
 
 {size}
 
-Values that the repair replaces as outliers: {repaired}.
-
 **Limits.** The wind is a third of the ship's speed and no model here includes it: its
 effect on the heading counts as error. About half of the yaw rate is predicted; the
-error of heading, its integral, is larger than the motion itself. Repair changes little
-here: a few short spikes hardly affect least squares over whole runs. Each run has its
-own shaft speed (10 to 17 1/s), so that most predictions are at a speed that few of the
-other runs cover. A structure without the shaft speed keeps its speed.
+error of heading, its integral, is larger than the motion itself. Each run has its own
+shaft speed (10 to 17 1/s), so that most predictions are at a speed that few of the
+other runs cover.
 
 ![Zigzags from rest](images/real_ships_c.svg)
 """

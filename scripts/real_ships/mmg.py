@@ -178,13 +178,7 @@ def run(data: Data) -> Section:
     seconds = time.process_time() - began
     text = TEXT.format(
         fitted=", ".join(FITTED),
-        chosen=table(
-            ["prior", *(f"strength {s:g}" for s in STRENGTHS), "chosen"],
-            [
-                [n, *(number(e, 2) for e in scores[n].values()), f"{strengths[n]:g}"]
-                for n in PRIORS
-            ],
-        ),
+        chosen=" and ".join(f"{strength:g}" for strength in strengths.values()),
         zigzags=table(
             ["fit", *MEASURES, *CLOSED],
             [
@@ -196,7 +190,6 @@ def run(data: Data) -> Section:
             ["fit", *(f"{name} {side}" for side in ("+35", "-35") for name in TURN)],
             [*([n, *circle_cells(m)] for n, m in large.items()), measured_row()],
         ),
-        found=found_text(models[first]),
         seconds=seconds,
         limits=LIMITS,
     )
@@ -219,16 +212,6 @@ def measured_row() -> list[str]:
         "measured",
         *(number(v, d) for side in CIRCLES for v, d in zip(side, digits, strict=True)),
     ]
-
-
-def found_text(model: ShipModel) -> str:
-    """What the trials changed most, in standard deviations of the prior."""
-    moved: Mapping[str, float] = (model.provenance or {})["deviations_from_prior"]
-    largest = sorted(moved, key=lambda name: -abs(moved[name]))[:4]
-    return ", ".join(
-        f"`{name}` {model.coefficients[name]:.3g} ({moved[name]:+.1f})"
-        for name in largest
-    )
 
 
 def painter(
@@ -278,30 +261,22 @@ hardly decide it."""
 TEXT = """
 Structure `mmg` ([structures](structures.md#the-mmg-form)), fitted to {fitted} alone.
 Means over the three other zigzags that switch at 5 or 10 degrees, open loop from the
-measured rudder, every fourth sample (5 Hz); the last two columns are the overshoots
-with the rudder reversed at the measured headings, which the neutral helm hardly
-affects.
+measured rudder at 5 Hz. The last two columns are the overshoots with the rudder
+reversed at the measured headings.
 
 {zigzags}
 
-The strength of the prior is the strongest of 1, 2, 3 that is within a tenth of the best
-when each of the three fitted runs is predicted from the two others. The score is the
-average of the errors of yaw rate, heading and both reversed overshoots, each divided by
-its aim:
+The strength of each prior is the strongest of 1, 2, 3 that is within a tenth of the
+best when each of the three fitted runs is predicted from the two others: {chosen}.
 
-{chosen}
-
-The coefficients that moved farthest from that prior (in its standard deviations):
-{found}.
-
-The same models at MARIN's scale (Froude), rudder 35 degrees from straight ahead at
-service speed, with time counted from the execute order; in brackets the difference from
-the measured circles (aims: advance 1 %, tactical diameter 4 %, drift 1.5 deg):
+The same models at MARIN's scale, rudder 35 degrees from service speed; in brackets the
+difference from the measured circles (aims: advance 1 %, tactical diameter 4 %, drift
+1.5 deg):
 
 {circles}
 
-A fit, including the choice of strength and the prediction of every trial, takes about
-{seconds:.1f} s of processor time with a warm cache (aim: 3 s).
+A fit with its predictions takes about {seconds:.1f} s of processor time with a warm
+cache (aim: 3 s).
 
 **Limits.** {limits}
 
