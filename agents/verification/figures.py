@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.verification.index_uncertainty import ManoeuvreUncertainty
+from agents.verification.monte_carlo import ManoeuvreUncertainty
 from agents.verification.tracks import Track
 from identification.report.predictions import RUDDER
 from shipgym.arrays import Floats

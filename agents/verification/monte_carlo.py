@@ -14,21 +14,42 @@ from agents.controllers.controller import Controller
 from agents.controllers.controller_file import read_controller
 from agents.jobs import HERE, JobEngine, run_jobs
 from agents.rollouts.course_keeping import Episodes, sail
-from agents.verification.index_uncertainty import (
-    ManoeuvreUncertainty,
-    SailedDraws,
-    nominal_runs,
-    sail_draws,
-    uncertainty_of,
-)
 from agents.verification.tracks import judged_task
-from shipgym.arrays import Flags
+from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_whole
-from shipgym.errors import InputError
+from shipgym.errors import InputError, UnstableModelError
+from shipgym.manoeuvres import Criterion, turning_circle, zigzag
+from shipgym.manoeuvres.imo import imo_criteria
+from shipgym.manoeuvres.imo_rules import imo_manoeuvres
+from shipgym.manoeuvres.intervals import (
+    IndexInterval,
+    intervals_of,
+    is_size,
+    own_indices,
+)
+from shipgym.manoeuvres.turning import full_rudder_deg
 from shipgym.models import ShipModel
 from shipgym.models.linear import is_course_stable
+from shipgym.trials.trial import Trial
 
 DRAWS_A_JOB = 25
+
+
+@dataclass(frozen=True)
+class ManoeuvreUncertainty:
+    """Standard manoeuvres of a model and of its draws."""
+
+    #: by the names of `imo_assessment`, each with its interval over the draws; those
+    #: that her equations allow
+    criteria: dict[str, Criterion]
+    #: draws that run away in one of the manoeuvres, shape (n_draws,)
+    unstable: Flags
+    zigzag: Trial  # 20/20 zigzag of the identified model
+    #: heading change of each stable draw in it, rad, shape (n_stable, n_samples)
+    zigzag_headings: Floats
+    circle: Trial  # turning circle of the identified model
+    #: north and east of some stable draws, m, shape (n_samples, 2)
+    circle_paths: tuple[Floats, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +92,7 @@ def monte_carlo(
     check_whole(seed, "seed", at_least=0)
     for controller in controllers:
         controller.check_fits_model(model)
-    nominal = nominal_runs(model)
+    runs = zigzag_and_circle(model)
     drawn = model.sample(draws, seed)
 
     def on_progress(done: int, _: int) -> None:
@@ -84,7 +105,7 @@ def monte_carlo(
     by_controller = whole["episodes"].values()
     return MonteCarlo(
         draws=tuple(drawn),
-        manoeuvres=uncertainty_of(model, nominal, SailedDraws(**whole["sailed"])),
+        manoeuvres=uncertainty_of(model, runs, whole["sailed"]),
         course_unstable=whole["course_unstable"],
         episodes=tuple(Episodes(**columns) for columns in by_controller),
     )
@@ -142,7 +163,7 @@ def do_draws(job: dict[str, Any]) -> dict[str, Any]:
         episodes[str(number)] = asdict(sailed)
     course_unstable = [not keeps_course(draw) for draw in draws]
     return {
-        "sailed": sail_draws(model, draws)._asdict(),
+        "sailed": sail_draws(model, draws),
         "course_unstable": np.array(course_unstable),
         "episodes": episodes,
     }
@@ -154,3 +175,96 @@ def keeps_course(model: ShipModel) -> bool:
         return is_course_stable(model)
     except InputError:
         return False
+
+
+def zigzag_and_circle(model: ShipModel) -> tuple[Trial, Trial]:
+    """20/20 zigzag and turning circle of a model, as the report draws them.
+
+    Raises UnstableModelError if it runs away.
+    """
+    dt = model.travel_time / 10.0
+    rudder = full_rudder_deg(model)
+    zigzag_run = zigzag(
+        model, 20.0, 20.0, duration=250.0 * dt, dt=dt, must_reverse=False
+    )
+    return zigzag_run, turning_circle(model, rudder, 300.0 * dt, dt)
+
+
+def sail_draws(model: ShipModel, draws: Sequence[ShipModel]) -> dict[str, Any]:
+    """Put models drawn from one through the standard manoeuvres.
+
+    `values`: indices by manoeuvre and name, NaN where there is none, and `ran_away` by
+    manoeuvre, each of shape (n_draws,); `lost`: whether a draw runs away in the zigzag
+    or the circle, shape (n_draws,); of the others `headings` in the zigzag, rad, shape
+    (n_samples,), and `paths` in the circle, m, shape (n_samples, 2).
+    """
+    needed = imo_manoeuvres(model)
+    sailed = intervals_of(
+        {name: one.no_indices for name, one in needed.items()},
+        draws,
+        {name: one.evaluate for name, one in needed.items()},
+    )
+    values = {}
+    ran_away = {}
+    for name, indices in sailed.items():
+        values[name] = {index: one.values for index, one in indices.items()}
+        first = next(iter(indices.values()))
+        ran_away[name] = first.ran_away
+
+    headings: list[Floats] = []
+    paths: list[Floats] = []
+    lost = np.zeros(len(draws), dtype=np.bool_)
+    for i, draw in enumerate(draws):
+        try:
+            zigzag_run, circle = zigzag_and_circle(draw)
+        except UnstableModelError:
+            lost[i] = True
+            continue
+        headings.append(zigzag_run["psi"])
+        paths.append(np.column_stack([circle["x"], circle["y"]]))
+    return {
+        "values": values,
+        "ran_away": ran_away,
+        "lost": lost,
+        "headings": headings,
+        "paths": paths,
+    }
+
+
+def uncertainty_of(
+    model: ShipModel, runs: tuple[Trial, Trial], sailed: dict[str, Any]
+) -> ManoeuvreUncertainty:
+    """Intervals and criteria from the runs of a model and of its draws.
+
+    `runs`: of `zigzag_and_circle`; `sailed`: of `sail_draws`. The runs of draws that
+    run away in one of the manoeuvres are left out.
+    """
+    intervals: dict[str, dict[str, IndexInterval]] = {}
+    for name, indices in own_indices(model, imo_manoeuvres(model)).items():
+        intervals[name] = {}
+        for index, value in indices.items():
+            intervals[name][index] = IndexInterval(
+                value=value,
+                values=sailed["values"][name][index],
+                ran_away=sailed["ran_away"][name],
+                is_size=is_size(index),
+            )
+
+    criteria = {}
+    lost = sailed["lost"]
+    unstable = lost.copy()
+    for name, criterion in imo_criteria(model, intervals).items():
+        if criterion.drawn is not None:
+            criteria[name] = criterion
+            unstable |= criterion.drawn.ran_away
+    stable = ~unstable[~lost]  # of those that were kept
+    paths_kept = 40  # turning circles of draws that a report draws
+    zigzag_run, circle = runs
+    return ManoeuvreUncertainty(
+        criteria=criteria,
+        unstable=unstable,
+        zigzag=zigzag_run,
+        zigzag_headings=np.array(sailed["headings"])[stable],
+        circle=circle,
+        circle_paths=tuple(np.array(sailed["paths"])[stable][:paths_kept]),
+    )

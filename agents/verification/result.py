@@ -9,7 +9,7 @@ import numpy as np
 
 from agents.controllers.controller import Controller
 from agents.rollouts.course_keeping import Episodes, StepResponses
-from agents.verification.index_uncertainty import ManoeuvreUncertainty
+from agents.verification.monte_carlo import ManoeuvreUncertainty
 from agents.verification.tracks import Track
 from identification import IdentificationResult
 from shipgym.arrays import Flags, finite
