@@ -299,7 +299,7 @@ def _overshoots(model: ShipModel, angle_deg: float, port: bool) -> np.ndarray:
 
 
 def tables(names: Sequence[str]) -> None:
-    """Print the rows of docs/identified_models.md: errors held out, and coverage."""
+    """Print the rows of docs/identified_models.md: errors held out and the factor."""
     print(
         "| name | turns, % | overshoots held out, deg | 10/10 and 20/20, deg | factor |"
         "\n| --- | --- | --- | --- | --- |"
