@@ -12,6 +12,34 @@ from shipgym.manoeuvres.quantiles import NORMAL_95
 from shipgym.trials.units import KNOT
 
 
+def findings(provenance: Mapping[str, Any]) -> list[str]:
+    """What was found of hard turn, rudder bias, current and wind, in sentences."""
+    return [
+        *turn_sentences(provenance),
+        *bias_sentences(provenance.get("rudder_bias")),
+        *sea_sentences(provenance),
+    ]
+
+
+def error_source(provenance: Mapping[str, Any]) -> str:
+    """Where the standard errors come from."""
+    posterior = provenance.get("posterior")
+    if posterior and posterior["kept"]:
+        return (
+            "a posterior by sampling (likelihood to the power"
+            f" {posterior['power']:.2g}, {posterior['walkers']} walkers,"
+            f" {posterior['steps']} steps, acceptance {posterior['acceptance']:.2f},"
+            f" autocorrelation time {posterior['autocorrelation_time']:.0f} steps,"
+            f" split R-hat {posterior['r_hat']:.3f},"
+            f" {posterior['effective_samples']:.0f} effective samples)"
+        )
+    source = "the residuals of the fit, correlated in time and between the equations"
+    error = provenance.get("model_error")
+    if error:
+        source += f", times {error['factor']:.2g} for model error ({error['how']})"
+    return source
+
+
 def turn_sentences(provenance: Mapping[str, Any]) -> list[str]:
     """What holds a hard turn of a model, by its provenance, and within how much."""
     sentences = []

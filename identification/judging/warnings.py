@@ -11,6 +11,14 @@ from shipgym import InputError, ShipModel, Trial
 from shipgym.models.linear import is_course_stable, steering_state_space
 
 EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw", "p": "roll"}
+#: Indices of manoeuvres: name and unit (L: ship lengths).
+INDICES = {
+    "overshoot_1_deg": ("first overshoot", "deg"),
+    "overshoot_2_deg": ("second overshoot", "deg"),
+    "advance_lengths": ("advance", "L"),
+    "transfer_lengths": ("transfer", "L"),
+    "tactical_diameter_lengths": ("tactical diameter", "L"),
+}
 
 
 def why_unstable(fit: Fit) -> str | None:
@@ -96,16 +104,9 @@ def held_out_error(fit: Fit) -> str:
 
 def _worst_index(unseen: Mapping[str, Any]) -> list[str]:
     """The index with the largest relative error, in words; none without any."""
-    words = {
-        "overshoot_1_deg": "first overshoot",
-        "overshoot_2_deg": "second overshoot",
-        "advance_lengths": "advance",
-        "transfer_lengths": "transfer",
-        "tactical_diameter_lengths": "tactical diameter",
-    }
     errors = []
     for name, metrics in unseen.items():
-        for index in words:
+        for index in INDICES:
             values = metrics.get(index)
             if values is None:
                 continue
@@ -117,9 +118,8 @@ def _worst_index(unseen: Mapping[str, Any]) -> list[str]:
         return []
 
     error, name, index = max(errors)
-    per_cent = 100.0 * error
-    trial = PurePath(name).name
-    return [f"{words[index]} {per_cent:.2g} % ({trial})"]
+    words, _ = INDICES[index]
+    return [f"{words} {100.0 * error:.2g} % ({PurePath(name).name})"]
 
 
 def undetermined(fit: Fit) -> list[str]:

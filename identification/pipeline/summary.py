@@ -1,24 +1,17 @@
-"""The table of coefficients that `IdentificationResult.summary` prints."""
+"""Rows that text and pages show of a fit, and the text that `summary` prints."""
 
 from collections.abc import Mapping
 from math import degrees
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich.table import Table
 
 from identification.judging.fit import Fit
-from identification.judging.sentences import (
-    bias_sentences,
-    sea_sentences,
-    turn_sentences,
-)
-from identification.judging.warnings import (
-    exactly_collinear,
-    undetermined,
-)
+from identification.judging.sentences import error_source, findings
+from identification.judging.warnings import exactly_collinear, undetermined
 from identification.text import as_text, lined_table
 from shipgym import ShipModel
-from shipgym.pages.numbers import MINUS, fixed, number
+from shipgym.pages.numbers import MINUS, NONE, fixed, number
 from shipgym.ships.particulars import ADDED_MASSES
 
 PRIME = 1e-5
@@ -36,136 +29,107 @@ PARTICULARS = {
 }
 
 
+class CoefficientRow(NamedTuple):
+    """A coefficient, as text; derivatives in the prime system times 1e5."""
+
+    name: str
+    value: str
+    error: str  # standard error
+    t: str  # value by its error; a dash without one
+    significant: bool  # from two standard errors on
+
+
 def summary_table(fit: Fit) -> str:
     """Coefficients with standard errors and t, inertia, and the verdict."""
     provenance = fit.model.provenance or {}
     kernel = provenance.get("kernel")
+    coefficients = lined_table(
+        coefficient_units(fit.model), "name", ">value", ">standard error", ">t"
+    )
+    for row in coefficient_rows(fit):
+        coefficients.add_row(*row[:4])
+    ship = lined_table("Ship and steering gear", "name", ">value", "source")
+    for name, source, value in quantities(fit.model):
+        ship.add_row(name, value, source)
     shown = [
-        _headline(fit),
-        kernel_text(kernel) if kernel else coefficients_table(fit),
-        _quantities_table(fit.model),
+        f"{fit.model.name}: {how_identified(fit)}; {_verdict(fit)}",
+        kernel_text(kernel) if kernel else coefficients,
+        ship,
+        f"The standard errors come from {error_source(provenance)}.",
+        *findings(provenance),
+        *undetermined(fit),
+        *exactly_collinear(fit),
     ]
-    posterior = provenance.get("posterior")
-    error = provenance.get("model_error")
-    if posterior and posterior["kept"]:
-        words = mixing_in_words(posterior)
-        shown.append(f"Standard errors are those of a posterior by sampling: {words}.")
-    elif error:
-        shown.append(
-            f"Standard errors are scaled by {error['factor']:.2g} for model error"
-            f" ({error['how']})."
-        )
-    shown += turn_sentences(provenance)
-    shown += bias_sentences(provenance.get("rudder_bias"))
-    shown += sea_sentences(provenance)
-    shown += undetermined(fit)
-    shown += exactly_collinear(fit)
     if "reference" in fit.metrics:
         shown.append(_against_reference(fit))
     return as_text(*shown)
 
 
-def mixing_in_words(posterior: Mapping[str, Any]) -> str:
-    """Size and diagnostics of a posterior by sampling, from its report."""
-    power = posterior["power"]
-    walkers = posterior["walkers"]
-    steps = posterior["steps"]
-    acceptance = posterior["acceptance"]
-    time = posterior["autocorrelation_time"]
-    r_hat = posterior["r_hat"]
-    samples = posterior["effective_samples"]
-    parts = [
-        f"likelihood to the power {power:.2g}",
-        f"{walkers} walkers",
-        f"{steps} steps",
-        f"acceptance {acceptance:.2f}",
-        f"autocorrelation time {time:.0f} steps",
-        f"split R-hat {r_hat:.3f}",
-        f"{samples:.0f} effective samples",
-    ]
-    return ", ".join(parts)
-
-
-def _headline(fit: Fit) -> str:
+def how_identified(fit: Fit) -> str:
+    """Structure, method and samples in words."""
     provenance = fit.model.provenance or {}
-    structure = provenance.get("structure")
-    method = provenance.get("method")
-    samples = provenance.get("samples")
-    decision = provenance.get("guard", {}).get("decision")
+    by = f"{provenance.get('structure')} by {provenance.get('method')}"
+    return f"{by}, {provenance.get('samples')} samples"
+
+
+def _verdict(fit: Fit) -> str:
+    guard = (fit.model.provenance or {}).get("guard", {})
     verdict = "NOT STABLE: its predictions run away and are not to be used"
     if fit.stable:
         verdict = "stable"
-    return (
-        f"{fit.model.name}: {structure} by {method}, {samples} samples;"
-        f" {verdict} ({decision})"
-    )
+    return f"{verdict} ({guard.get('decision')})"
 
 
 def kernel_text(report: Mapping[str, Any]) -> str:
     """Kernel added to the reference ship, in words: its weights tell nothing."""
-    errors = []
-    for name, error in report["heading_errors_held_out"].items():
-        angle = _heading_error(error, ".2g", " deg")
-        errors.append(f"{name} {angle}")
-    held_out = ", ".join(errors)
-    centres = report["centres"]
-    length = report["length"]
-    features = report["features"]
-    C = report["C"]
+    errors = [
+        f"{name} {_heading_error(error)}"
+        for name, error in report["heading_errors_held_out"].items()
+    ]
     return (
-        f"Kernel: {centres} radial basis functions of length {length:g} in"
-        f" {features} features an equation, C {C:g}; heading held out, rms: {held_out}"
+        f"Kernel: {report['centres']} radial basis functions of length"
+        f" {report['length']:g} in {report['features']} features an equation, C"
+        f" {report['C']:g}; heading held out, rms: {', '.join(errors)}"
     )
 
 
-def _heading_error(error: float | None, digits: str, unit: str = "") -> str:
+def _heading_error(error: float | None) -> str:
     """An error of the heading, rad, in degrees."""
-    if error is None:
-        return "ran away"
-    return f"{degrees(error):{digits}}{unit}"
+    return "ran away" if error is None else f"{degrees(error):.2g} deg"
 
 
 def are_derivatives(model: ShipModel) -> bool:
-    """Tell whether coefficients are hydrodynamic derivatives in the prime system.
-
-    Such are printed times 1e-5.
-    """
+    """Tell whether coefficients are hydrodynamic derivatives in the prime system."""
     dynamics = model.dynamics
     return dynamics.normalisation == "prime" and dynamics.quantity == "force"
 
 
-def coefficients_table(fit: Fit) -> Table:
-    """Coefficients with standard error and t."""
-    dynamics = fit.model.dynamics
+def coefficient_units(model: ShipModel) -> str:
+    """What the coefficients are, and their units."""
+    if are_derivatives(model):
+        return (
+            "Hydrodynamic derivatives in the prime system with the instantaneous speed,"
+            " times 10⁻⁵"
+        )
+    dynamics = model.dynamics
+    return f"Coefficients of {dynamics.quantity}s, {dynamics.normalisation} units"
+
+
+def coefficient_rows(fit: Fit) -> list[CoefficientRow]:
+    """A row for each coefficient."""
     derivatives = are_derivatives(fit.model)
-    title = f"Coefficients of {dynamics.quantity}s, {dynamics.normalisation} units"
-    if derivatives:
-        title = "Hydrodynamic derivatives, prime system, 1e-5"
-    table = lined_table(title, "name", ">value", ">standard error", ">t")
+    rows = []
     for name, error in fit.standard_errors.items():
         value = fit.coefficients[name]
-        t = "-"
-        if error > 0.0:
-            t = f"{value / error:.1f}"
-        digits = ".6g"
+        own, deviation = number(value), number(error)
         if derivatives:
-            value = value / PRIME
-            error = error / PRIME
-            digits = ".2f"
-        table.add_row(
-            name,
-            f"{value:{digits}}",
-            f"{error:.2g}",
-            t,
-        )
-    return table
-
-
-def _quantities_table(model: ShipModel) -> Table:
-    table = lined_table("Ship and steering gear", "name", ">value", "source")
-    for name, source, value in quantities(model):
-        table.add_row(name, value, source)
-    return table
+            own, deviation = fixed(value / PRIME, 1), fixed(error / PRIME, 1)
+        t, significant = NONE, bool(value)
+        if error > 0.0:
+            t = fixed(value / error, 1)
+            significant = abs(value / error) >= 2.0
+        rows.append(CoefficientRow(name, own, deviation, t, significant))
+    return rows
 
 
 def quantities(model: ShipModel) -> list[tuple[str, str, str]]:
@@ -199,13 +163,9 @@ def _against_reference(fit: Fit) -> Table:
         "Open-loop heading, root mean square error, beside the bare reference ship"
         f" '{reference['name']}'"
     )
-    table = lined_table(title, "trial", "use", ">model, deg", ">reference, deg")
+    table = lined_table(title, "trial", "use", ">model", ">reference")
     for name, metrics in fit.metrics["trials"].items():
         bare = reference["trials"][name]
-        table.add_row(
-            name,
-            metrics["use"],
-            _heading_error(metrics["rmse"]["psi"], ".2f"),
-            _heading_error(bare["rmse"]["psi"], ".2f"),
-        )
+        errors = [_heading_error(one["rmse"]["psi"]) for one in (metrics, bare)]
+        table.add_row(name, metrics["use"], *errors)
     return table

@@ -162,9 +162,9 @@ def test_the_summary_prints_each_coefficient_with_its_error(
     for name, error in truncated.standard_errors.items():
         value = truncated.coefficients[name]
         assert rows[name] == [
-            f"{1e5 * value:.2f}",
-            f"{1e5 * error:.2g}",
-            f"{value / error:.1f}",
+            fixed(1e5 * value, 1),
+            fixed(1e5 * error, 1),
+            fixed(value / error, 1),
         ]
     gear = truncated.model.steering
     assert rows["rudder limit"][0] == f"{number(gear.rudder_limit_deg)} deg"
