@@ -43,14 +43,13 @@ class LSSVM(LinearRegressor):
         In primal form.
     scale : bool or array-like of shape (n_features,)
         Divide each feature by its standard deviation (its root mean square without
-        intercept), or by the given values, before the penalty acts on the coefficients.
-        `coef_` is for the features as given.
+        intercept), or by the given values, before the penalty acts. `coef_` is for the
+        features as given.
     fit_intercept : bool
         Whether b is free or zero.
     robust : bool
         Whether outliers lose their influence: samples are weighted by their residuals
-        and fitted again until the weights converge (weighted LS-SVM, Suykens et al.
-        2002).
+        until the weights converge (Suykens et al. 2002).
 
     Attributes
     ----------

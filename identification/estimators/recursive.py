@@ -63,11 +63,10 @@ class Recursion(LinearRegressor):
     ----------
     forgetting : float, above 0, at most 1
         Factor by which older samples count less at each step; 1 forgets nothing. No
-        coefficient of the least-squares forms becomes less certain than it was at the
-        start, so that nothing winds up while the ship sails straight.
+        coefficient becomes less certain than at the start, lest it wind up while the
+        ship sails straight.
     C : float, above 0
-        Covariance of the scaled coefficients at the start, that is the weight of the
-        errors in LS-SVM.
+        Covariance of the scaled coefficients at the start: the weight of the errors.
     scale : bool or array-like of shape (n_features,)
         Divide the regressors by their root mean square, or by given values.
     start_samples : int, at least 0

@@ -49,15 +49,13 @@ class RMSVM(LinearRegressor):
     ----------
     C : float or None, at least 0
         Weight of the errors, by the mean over samples; 0 adds nothing to the reference
-        ship. None: 1, or by `identify` the strongest regularisation nearly as good as
-        the best on trials held out.
+        ship. None: 1; `identify` chooses it by trials held out.
     epsilon : float or None, at least 0
-        The insensitive band in [0, 1], standard deviations of the target. None: 0.1, or
-        by `identify` from a pattern search.
+        The insensitive band in [0, 1], standard deviations of the target. None: 0.1;
+        `identify` finds it by a pattern search.
     folds : {"trials", "largest-rudder"}
-        What `identify` chooses the weight by: each trial held out in turn (of a single
-        one, pieces), or the trials of the largest rudder together, for models that are
-        to turn harder than any trial.
+        What `identify` holds out: each trial in turn, or the trials of the largest
+        rudder together, for models that are to turn harder than any trial.
 
     Attributes
     ----------

@@ -47,8 +47,7 @@ class Options:
     ----------
     structure : str or Structure
         Terms of the model: a name of `shipgym.list_structures`, a table, or "auto": the
-        structure and method that predict the trials to fit best, each held out in turn;
-        a method other than the default is kept.
+        structure and method that predict held-out trials best.
     method : str or estimator
         How the coefficients are fitted: a name of
         `identification.models.methods.METHODS`, such as "tls-svm", an estimator
