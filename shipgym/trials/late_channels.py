@@ -7,7 +7,7 @@ the rest of it follows from yaw rate, sway and their history.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -46,7 +46,7 @@ class LateChannel(NamedTuple):
         )
 
 
-class ClockOffset(NamedTuple):
+class _Offset(NamedTuple):
     """Delay of a channel, and the certainty of the estimate."""
 
     late: float  # s
@@ -56,11 +56,7 @@ class ClockOffset(NamedTuple):
 
 def find_late_channels(log: Log) -> list[LateChannel]:
     """Yaw rate and rudder where a log shows that they are late."""
-    believed = []
-    for suspect in _suspects(log):
-        if _holds(suspect, _delays_with_more_noise(log, suspect.channel)):
-            believed.append(suspect)
-    return believed
+    return [suspect for suspect in _suspects(log) if _holds(log, suspect)]
 
 
 def is_corrected(
@@ -86,8 +82,9 @@ def is_corrected(
 
 def _suspects(log: Log) -> list[LateChannel]:
     """Channels that one log, as it stands, shows late by more than its errors."""
-    rate = _rate_offset(log)
-    rudder = _rudder_offset(log, rate)
+    offsets = _offsets(log)
+    rate = offsets.get("r")
+    rudder = offsets.get("delta")
     late = []
     if rate is not None and rate.certainty >= _CERTAIN:
         dynamics_s = 0.25
@@ -98,7 +95,7 @@ def _suspects(log: Log) -> list[LateChannel]:
     certain_derived = 10.0
     needed = _CERTAIN if log.has("r") else certain_derived
     if rudder is not None and rudder.certainty >= needed:
-        cycle = cycle_time(log.t, log.channels["delta"])
+        cycle = _cycle_time(log.t, log.channels["delta"])
         # by which slow ships of other dynamics seem late
         error = math.hypot(rudder.error, max(1.0, cycle / 300.0))
         # an early rudder looks like that of a ship which answers slowly
@@ -110,46 +107,36 @@ def _suspects(log: Log) -> list[LateChannel]:
     return [one for one in late if abs(one.delay) >= significant * one.error]
 
 
-def _holds(suspect: LateChannel, delays: Floats) -> bool:
+def _holds(log: Log, suspect: LateChannel) -> bool:
     """Return whether the delay is still there with more noise, and none of its making.
 
     What noise does to a delay it does again when as much is added (simulation
     extrapolation: Cook & Stefanski 1994), so the delay without noise is the first one
     less the change.
     """
-    found = delays[np.isfinite(delays)]
-    if found.size < 0.75 * delays.size:
-        return False
-    change = float(np.median(found)) - suspect.delay
-    noise = math.hypot(change, float(np.std(found)))
-    return noise < 0.4 * abs(suspect.delay)
-
-
-def _delays_with_more_noise(log: Log, channel: str) -> Floats:
-    """Delays of a channel in copies of a log with its own noise added once more, s.
-
-    NaN where a copy shows none.
-    """
     n_copies = 8
     random = np.random.default_rng(0)
-    names = [name for name in ("psi", "r", "delta") if log.has(name)]
-    delays = np.full(n_copies, np.nan)
-    for copy in range(n_copies):
+    found = []
+    for _ in range(n_copies):
         channels = dict(log.channels)
-        for name in names:
-            values = log.channels[name]
-            noise = white_noise(values) * random.standard_normal(values.size)
-            channels[name] = values + noise
+        for name in ("psi", "r", "delta"):
+            if log.has(name):
+                values = log.channels[name]
+                noise = _white_noise(values) * random.standard_normal(values.size)
+                channels[name] = values + noise
         noisy = replace(log, channels=channels)
-        offset = _rate_offset(noisy)
-        if channel == "delta":
-            offset = _rudder_offset(noisy, offset)
+        offset = _offsets(noisy).get(suspect.channel)
         if offset is not None:
-            delays[copy] = offset.late
-    return delays
+            found.append(offset.late)
+
+    if len(found) < 0.75 * n_copies:
+        return False
+    change = float(np.median(found)) - suspect.delay
+    noise_s = math.hypot(change, float(np.std(found)))
+    return noise_s < 0.4 * abs(suspect.delay)
 
 
-def white_noise(values: Floats) -> float:
+def _white_noise(values: Floats) -> float:
     """Standard deviation of white noise on a smooth signal, by fourth differences."""
     differences = np.diff(values, n=4)
     magnitude = np.median(np.abs(differences))
@@ -158,33 +145,38 @@ def white_noise(values: Floats) -> float:
     return float(of_differences / gain)
 
 
-def _rate_offset(log: Log) -> ClockOffset | None:
-    """Delay of the yaw rate against the heading; None where a log does not show it."""
-    if not log.has("psi", "r") or not reverses(log.channels["r"]):
-        return None
-    return clock_offset(log.t, log.channels["psi"], log.channels["r"], {})
+def _offsets(log: Log) -> dict[str, _Offset | None]:
+    """Delays of the yaw rate against the heading and of the rudder against both.
 
-
-def _rudder_offset(log: Log, rate: ClockOffset | None) -> ClockOffset | None:
-    """Delay of the rudder against the yaw rate, on the clock of the heading.
-
-    None where the log does not show it.
+    None or missing where a log does not show them.
     """
-    has_motion = log.has("psi") or log.has("r")
-    if not log.has("delta") or not has_motion:
-        return None
-    delta = log.channels["delta"]
-    if not reverses(delta, least=2.0 * DEGREE):
-        return None
     t = log.t
+    channels = log.channels
+    found: dict[str, _Offset | None] = {}
+    if log.has("psi", "r") and _reverses(channels["r"]):
+        found["r"] = _offset(t, channels["psi"], channels["r"], [])
+    has_motion = log.has("psi") or log.has("r")
+    least_swing = 2.0 * DEGREE
+    if not (has_motion and log.has("delta")):
+        return found
+    delta = channels["delta"]
+    if not _reverses(delta, least_swing):
+        return found
+
     if log.has("r"):
+        rate = found.get("r")
         late = 0.0 if rate is None else rate.late
-        r = np.interp(t + late, t, log.channels["r"])
+        r = np.interp(t + late, t, channels["r"])
     else:
         # the same mean for both, so that one follows the other as before
-        r = _window_mean(t, log.channels["psi"])
+        r = _window_mean(t, channels["psi"])
         delta = _window_mean(t, integral(t, delta))
-    return rudder_clock_offset(t, r, delta)
+    # yaw rate and the history of both explain the rest of the acceleration
+    others = [r, r**3]
+    for memory in (20.0, 80.0):
+        others += [_remembered(t, r, memory), _remembered(t, delta, memory)]
+    found["delta"] = _offset(t, r, delta, others)
+    return found
 
 
 def _window_mean(t: Floats, total: Floats) -> Floats:
@@ -214,21 +206,13 @@ class _Windows(NamedTuple):
         return slope
 
 
-def clock_offset(
-    t: Floats, target: Floats, late: Floats, others: Mapping[str, Floats]
-) -> ClockOffset | None:
+def _offset(
+    t: Floats, target: Floats, late: Floats, others: Sequence[Floats]
+) -> _Offset | None:
     """Delay of a channel against the change of a target; None where it cannot be found.
 
-    Parameters
-    ----------
-    t : ndarray of shape (n_samples,)
-        Time, s.
-    target : ndarray of shape (n_samples,)
-        Differentiated over windows of time.
-    late : ndarray of shape (n_samples,)
-        The channel.
-    others : mapping of str to ndarray of shape (n_samples,)
-        What explains the change of the target together with the channel.
+    The target is differentiated over windows of time, s; the other channels explain its
+    change together with the late one. All have shape (n_samples,).
     """
     windows = _windows(t)
     if windows is None:
@@ -262,7 +246,7 @@ def clock_offset(
     left = residual(at)
     least = max(float(left @ left), 1e-300)
     free = _independent_samples(left, least)
-    return ClockOffset(
+    return _Offset(
         late=at,
         error=math.sqrt(2.0 * least / free / curvature),
         certainty=math.sqrt(free * max(power / least - 1.0, 0.0)),
@@ -284,11 +268,11 @@ def _windows(t: Floats) -> _Windows | None:
     return _Windows(t, np.arange(first, last, step), max(0.5 * length, step))
 
 
-def _known_directions(windows: _Windows, others: Mapping[str, Floats]) -> Floats:
+def _known_directions(windows: _Windows, others: Sequence[Floats]) -> Floats:
     """Orthonormal basis of a constant and other channels, shape (n_windows, n)."""
     smallest = 0.02  # singular value; what is less follows from the others
     columns = [np.ones(windows.centres.size)]
-    for values in others.values():
+    for values in others:
         columns.append(windows.slope(integral(windows.t, values)))
     directions = np.column_stack(columns)
     directions /= np.linalg.norm(directions, axis=0)
@@ -309,18 +293,6 @@ def _independent_samples(residual: Floats, squares: float) -> float:
     return max(residual.size * share, 2.0)
 
 
-def rudder_clock_offset(t: Floats, r: Floats, delta: Floats) -> ClockOffset | None:
-    """Delay of the rudder against the yaw acceleration.
-
-    Yaw rate and the history of both explain the rest of the acceleration.
-    """
-    explained = {"r": r, "r^3": r**3}
-    for memory in (20.0, 80.0):
-        explained[f"r, {memory:g} s"] = _remembered(t, r, memory)
-        explained[f"delta, {memory:g} s"] = _remembered(t, delta, memory)
-    return clock_offset(t, target=r, late=delta, others=explained)
-
-
 def _remembered(t: Floats, values: Floats, memory: float) -> Floats:
     """Values by a first-order low-pass, whose time constant is the memory, s."""
     from scipy.signal import lfilter
@@ -332,7 +304,7 @@ def _remembered(t: Floats, values: Floats, memory: float) -> Floats:
     return np.interp(t, even, lagged)
 
 
-def reverses(values: Floats, least: float = 0.0) -> bool:
+def _reverses(values: Floats, least: float = 0.0) -> bool:
     """Return whether a channel reverses three times or more, as in zigzags.
 
     A single step shows no delay.
@@ -344,7 +316,7 @@ def reverses(values: Floats, least: float = 0.0) -> bool:
     return bool(np.count_nonzero(np.diff(sides[sides != 0.0])) >= 3)
 
 
-def cycle_time(t: Floats, values: Floats) -> float:
+def _cycle_time(t: Floats, values: Floats) -> float:
     """Usual time from there and back to there of a channel that reverses, s."""
     sides = _sides(values)
     is_far = sides != 0.0

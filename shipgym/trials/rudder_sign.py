@@ -227,14 +227,10 @@ def _fit(windows: _Windows, damping: float) -> _Fit:
 def _response(t: Floats, values: Floats, damping: float) -> Floats:
     """Heading of a ship with r' = -damping r + values from rest, by trapezoids."""
     steps = np.diff(t, axis=1)
-    decays = np.exp(-damping * steps)
-    held = _means(values)
-    gains = held * (1.0 - decays) / damping
+    grown = np.exp(damping * t[:, 1:])
+    gains = _means(values) * -np.expm1(-damping * steps) / damping
     r = np.zeros_like(t)
-    last = steps.shape[1]
-    for k in range(last):
-        kept = decays[:, k] * r[:, k]
-        r[:, k + 1] = kept + gains[:, k]
+    r[:, 1:] = np.cumsum(gains * grown, axis=1) / grown
 
     turned = steps * _means(r)
     psi = np.zeros_like(t)
