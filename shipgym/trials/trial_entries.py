@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +59,6 @@ class _Shared:
 
     ship: Particulars
     columns: Mapping[str, Column]
-    words: Mapping[str, Any]
     sensors: Mapping[str, Any]
     conventions: Conventions
 
@@ -103,7 +102,7 @@ def _read_shared(path: Path, data: Mapping[str, Any], ship: Particulars) -> _Sha
     conventions = Conventions(
         **words, xg=ship.xg, where=where, installation=installation
     )
-    return _Shared(ship, columns, words, sensors, conventions)
+    return _Shared(ship, columns, sensors, conventions)
 
 
 def _read_entry(table: Any, folder: Path, where: str, shared: _Shared) -> TrialEntry:
@@ -160,12 +159,7 @@ def _own_conventions(
         installation = Installation.from_mapping(
             sensors, f"{where} sensors", shared.ship
         )
-    return Conventions(
-        **{**shared.words, **own},
-        xg=shared.ship.xg,
-        where=where,
-        installation=installation,
-    )
+    return replace(shared.conventions, where=where, installation=installation, **own)
 
 
 def _check_entries(path: Path, entries: Sequence[TrialEntry]) -> None:

@@ -9,8 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipgym.arrays import Floats
-from shipgym.errors import InputError
 from shipgym.files import shipped_toml
 from shipgym.trials.column_values import without_sentinels
 from shipgym.trials.columns import Column
@@ -164,7 +162,7 @@ def _settle_rudder(table: LogTable, guesses: dict[str, ColumnGuess]) -> None:
             continue
         by_size = guess.reason.startswith("from its s")
         units = (guess.unit, heading.unit)
-        psi = _numbers(table, heading.column)
+        psi = table.numbers_if_all(heading.column, sided=True)
         if not by_size or units != ("rad", "deg") or psi is None:
             continue
 
@@ -243,7 +241,7 @@ def _unit_where_fitting(table: LogTable, column: str, channel: str) -> UnitGuess
         size = unit_by_size(None, channel)
         return size._replace(reason="paths of Signal K are in SI units")
     in_cells = _unit_in_cells(table, column, channel)
-    values = _numbers(table, column)
+    values = table.numbers_if_all(column, sided=True)
     if values is not None and channel != "t":
         values, _ = without_sentinels(channel, values, factor=1.0)
     return in_cells or unit_by_size(values, channel)
@@ -254,7 +252,7 @@ def _is_duration(table: LogTable, column: str, unit: UnitGuess) -> bool:
 
     Seconds of 1.7e9 count from 1970.
     """
-    values = _numbers(table, column)
+    values = table.numbers_if_all(column, sided=True)
     if values is None:
         return False
     by_size = unit_by_size(values, "t").unit
@@ -323,7 +321,7 @@ def _even_column(table: LogTable, free: list[str]) -> ColumnGuess | None:
     """A column without a known name that increases evenly, as time does."""
     numbers_of_rows = ("", "index", "row", "no", "nr", "id", "seq", "sample")
     for column in free:
-        values = _numbers(table, column)
+        values = table.numbers_if_all(column, sided=True)
         if values is None or values.size < 10:
             continue
         steps = np.diff(values)
@@ -370,11 +368,3 @@ def _plain(name: str) -> str:
 
 def _matches(forms: Iterable[str], patterns: Iterable[str]) -> bool:
     return any(fnmatchcase(form, one) for form in forms for one in patterns)
-
-
-def _numbers(table: LogTable, column: str) -> Floats | None:
-    """Numbers of a column; None of clock times, degrees and minutes."""
-    try:
-        return table.numbers(column, sided=True)
-    except InputError:
-        return None

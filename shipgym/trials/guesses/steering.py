@@ -6,7 +6,6 @@ from itertools import combinations
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
 from shipgym.trials.column_values import FULL_RUDDER_DEG
 from shipgym.trials.readers.log_table import LogTable
 
@@ -34,9 +33,8 @@ def steering_command(table: LogTable, free: list[str]) -> Command | None:
     """Steering command in columns of no other channel, which are then not free."""
     numbers = {}
     for column in free:
-        try:
-            values = table.numbers(column)
-        except InputError:
+        values = table.numbers_if_all(column)
+        if values is None:
             continue
         known = values[np.isfinite(values)]
         if known.size and np.ptp(known) > 0.0:
@@ -99,12 +97,9 @@ def other_rudder(table: LogTable, column: str, free: list[str]) -> str | None:
             are_sides = side != other_side and rest == other_rest
         if not are_sides:
             continue
-        try:
-            values = [table.numbers(name, sided=True) for name in (column, other)]
-        except InputError:
-            continue
-        moved = [np.ptp(one[np.isfinite(one)]) for one in values]
-        if min(moved) > 0.1 * max(moved):
+        both = [table.numbers_if_all(name, sided=True) for name in (column, other)]
+        moved = [np.ptp(one[np.isfinite(one)]) for one in both if one is not None]
+        if len(moved) == 2 and min(moved) > 0.1 * max(moved):
             return other
     return None
 

@@ -113,6 +113,13 @@ class LogTable:
                 numbers[row] = number
         return numbers
 
+    def numbers_if_all(self, name: str, *, sided: bool = False) -> Floats | None:
+        """A column as numbers; None where :meth:`numbers` refuses one of its cells."""
+        try:
+            return self.numbers(name, sided=sided)
+        except InputError:
+            return None
+
     def _number(self, text: str, *, sided: bool) -> float | None:
         """A number, with a side or a unit or neither; None for other text."""
         if self.decimal_comma and "." not in text:

@@ -23,6 +23,7 @@ class Track(NamedTuple):
     t: Floats
     lines: Floats
     values: Floats
+    source: str
 
     @property
     def covered(self) -> float:
@@ -41,7 +42,6 @@ class Tracks:
     """The channels of a log, each of one source, and what was left out."""
 
     by_channel: dict[str, Track] = field(default_factory=dict)
-    sources: dict[str, str] = field(default_factory=dict)  # by channel
     notes: list[str] = field(default_factory=list)
     magnetic: bool = False  # the heading counts from magnetic north
 
@@ -57,7 +57,7 @@ def choose_tracks(heard: Heard, clock: Clock) -> Tracks:
         seconds = {port_source(source) for source in sources}
         singles = {name: sources[name] for name in sources if name not in seconds}
         best = _best_source(of_source, singles)
-        tracks[channel], found.sources[channel] = of_source[best], best
+        tracks[channel] = of_source[best]
         if channel != "variation":
             name = channel.removesuffix("_magnetic")
             found.notes += _note_others(name, best, singles)
@@ -68,14 +68,14 @@ def choose_tracks(heard: Heard, clock: Clock) -> Tracks:
         sog, cog = tracks["sog"], tracks["cog"]
         t, of_sog, of_cog = np.intersect1d(sog.t, cog.t, return_indices=True)
         lines = sog.lines[of_sog]
-        tracks["sog"] = Track(t, lines, sog.values[of_sog])
-        tracks["cog"] = Track(t, lines, cog.values[of_cog])
+        tracks["sog"] = Track(t, lines, sog.values[of_sog], sog.source)
+        tracks["cog"] = Track(t, lines, cog.values[of_cog], cog.source)
     _choose_heading(found)
     tracks.pop("variation", None)
     _leave_out_rare(found, longest)
     by_source: dict[str, list[str]] = {}
-    for channel in tracks:
-        by_source.setdefault(found.sources[channel], []).append(channel)
+    for channel, track in tracks.items():
+        by_source.setdefault(track.source, []).append(channel)
     read = [f"{', '.join(names)} from {source}" for source, names in by_source.items()]
     found.notes.insert(0, f"{'; '.join(read)}; time from {clock.source}")
     return found
@@ -89,8 +89,9 @@ def _leave_out_rare(found: Tracks, longest: float) -> None:
         is_rare = track.covered < 0.1 * longest
         if (is_rare and not is_needed) or count < FEWEST_SAMPLES:
             del found.by_channel[channel]
-            source = found.sources[channel]
-            found.notes.append(f"{channel} of {source} left out: only {count} values")
+            found.notes.append(
+                f"{channel} of {track.source} left out: only {count} values"
+            )
 
 
 def _tracks_of(sources: BySource, clock: Clock) -> dict[str, Track]:
@@ -102,7 +103,7 @@ def _tracks_of(sources: BySource, clock: Clock) -> dict[str, Track]:
         # to a tenth of a millisecond
         t = np.round(times_of(values, clock), 4)
         t, first = np.unique(t, return_index=True)
-        tracks[source] = Track(t, lines[first], numbers[first])
+        tracks[source] = Track(t, lines[first], numbers[first], source)
     return tracks
 
 
@@ -152,7 +153,6 @@ def _choose_rudder(found: Tracks, tracks: dict[str, Track], best: str) -> None:
         )
         if port_moves:
             found.by_channel["delta"] = port
-            found.sources["delta"] = port_source(best)
         return
     of_port = port.at(track.t)
     apart_deg = np.mean(track.values - of_port) / DEGREE
@@ -169,25 +169,20 @@ def _choose_heading(found: Tracks) -> None:
 
     The variation is added where the log has one; else the heading stays magnetic.
     """
-    tracks, sources = found.by_channel, found.sources
+    tracks = found.by_channel
     compass = tracks.pop("psi_magnetic", None)
     if compass is None:
         return
-    source = sources["psi_magnetic"]
     true = tracks.get("psi")
     if true is not None:
-        counts = [
-            f"{name} ({track.t.size} values)"
-            for name, track in ((sources["psi"], true), (source, compass))
-        ]
+        counts = [f"{one.source} ({one.t.size} values)" for one in (true, compass)]
         is_true = true.covered >= 0.5 * compass.covered
         if not is_true:
             counts.reverse()
-        if source != sources["psi"]:
+        if true.source != compass.source:
             found.notes.append(f"psi is from {counts[0]}; {counts[1]} left out")
         if is_true:
             return
-    sources["psi"] = source
     tracks["psi"] = compass
     variation = tracks.get("variation")
     found.magnetic = variation is None
@@ -197,8 +192,8 @@ def _choose_heading(found: Tracks) -> None:
     tracks["psi"] = compass._replace(values=compass.values + added)
     middle = float(np.median(added)) / DEGREE
     found.notes.append(
-        f"psi is the magnetic heading of {source} with the variation of"
-        f" {sources['variation']} added, {abs(middle):.1f} deg"
+        f"psi is the magnetic heading of {compass.source} with the variation of"
+        f" {variation.source} added, {abs(middle):.1f} deg"
         f" {'E' if middle >= 0.0 else 'W'}"
     )
 
