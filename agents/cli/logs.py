@@ -32,10 +32,6 @@ def new_ship_command(
             help="Length between perpendiculars, m; or fill it in later.",
         ),
     ] = None,
-    strict: Annotated[
-        bool,
-        Option("--strict", help="Refuse sentences of NMEA 0183 without a checksum."),
-    ] = False,
 ) -> None:
     """Write a ship file for recorded trials.
 
@@ -50,10 +46,8 @@ def new_ship_command(
         raise InputError(
             f"{out}: exists already; choose another name with --out, or remove it"
         )
-    checksums = "required" if strict else "optional"
-    guessed = _guess_trials(logs, checksums)
-    facts = _facts(guessed, out)
-    facts |= {"length": length, "checksums": checksums}
+    guessed = _guess_trials(logs)
+    facts = _facts(guessed, out) | {"length": length}
     ship_file = render("shipgym.pages/ship.toml.jinja", **facts)
     write_text(ship_file, out)
 
@@ -206,16 +200,16 @@ def _columns(guessed: TrialGuess) -> dict[str, Any]:
     return columns
 
 
-def _guess_trials(logs: list[Path], checksums: str) -> list[TrialGuess]:
+def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
     """Logs read with guessed columns; the first has to be readable."""
     from agents.cli.terminal import warn
     from shipgym.errors import InputError
     from shipgym.trials.guesses import guess_trial
 
-    guessed = [guess_trial(logs[0], checksums=checksums)]
+    guessed = [guess_trial(logs[0])]
     for log in logs[1:]:
         try:
-            guessed.append(guess_trial(log, checksums=checksums))
+            guessed.append(guess_trial(log))
         except InputError as error:
             warn(f"{error}; left out of the ship file")
     return guessed
@@ -245,10 +239,6 @@ def look_command(
     out: Annotated[Path, Option(metavar="FILE", help="The page to write.")] = Path(
         "look.html"
     ),
-    strict: Annotated[
-        bool,
-        Option("--strict", help="Refuse sentences of NMEA 0183 without a checksum."),
-    ] = False,
 ) -> None:
     """Draw the trials of a ship file, or a log.
 
@@ -270,8 +260,7 @@ def look_command(
         readings = [declared_reading(ship_file, trial) for trial in trials]
         remarks = [*ship_file.undecided]
     else:
-        checksums = "required" if strict else "optional"
-        guess = guess_trial(log, checksums=checksums)
+        guess = guess_trial(log)
         if guess.trial is None:
             raise InputError(
                 f"{log}: "

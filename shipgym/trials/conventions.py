@@ -23,7 +23,6 @@ _KEYS = (
     "variation_deg",
     "rudder_offset_deg",
     "clock_offsets",
-    "checksums",
 )
 
 
@@ -43,8 +42,6 @@ class Installation:
     clock_offsets : {"correct", "keep"}, optional
         By default late channels are corrected where they have clocks of their own, else
         refused.
-    checksums : {"required", "optional"}
-        Whether sentences of NMEA 0183 without a checksum are refused.
     """
 
     forward: float = 0.0
@@ -52,7 +49,6 @@ class Installation:
     heading_offset: float | str = 0.0
     rudder_offset: float = 0.0
     clock_offsets: str | None = None
-    checksums: str = "optional"
 
     @classmethod
     def from_mapping(
@@ -66,8 +62,6 @@ class Installation:
         clocks = table.get("clock_offsets")
         if clocks is not None:
             check_choice(clocks, ("correct", "keep"), f"{where} clock_offsets")
-        checksums = table.get("checksums", "optional")
-        check_choice(checksums, ("required", "optional"), f"{where} checksums")
         antenna = table.get("gnss_antenna", {})
         check_table(antenna, f"{where} gnss_antenna", ("forward", "starboard"))
         heading: float | str = "estimate"
@@ -85,7 +79,6 @@ class Installation:
             heading_offset=heading,
             rudder_offset=_radians(table, "rudder_offset_deg", where),
             clock_offsets=clocks,
-            checksums=checksums,
         )
 
     @property

@@ -129,8 +129,7 @@ class ShipFile:
             "length": self.particulars.length,
         }
         with placed(entry.where):
-            checksums = entry.conventions.installation.checksums
-            tables = [read_log(path, checksums=checksums) for path in entry.paths]
+            tables = [read_log(path) for path in entry.paths]
             log = import_tables(tables, entry.columns, entry.conventions)
             if entry.cut is None:
                 trials = [trial_of(log, entry.file, **facts)]

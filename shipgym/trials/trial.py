@@ -338,7 +338,7 @@ class Trial:
         """
         where = f"{path.path if isinstance(path, LogTable) else path}:"
         installation = Installation.from_mapping(sensors or {}, f"{where} sensors")
-        table = read_log(path, checksums=installation.checksums)
+        table = read_log(path)
         chosen = None
         if columns is not None:
             chosen = parse_columns(columns, f"{where} columns")

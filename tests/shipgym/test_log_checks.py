@@ -222,9 +222,7 @@ def zigzag():
 
 def record(step):
     """Time, heading, yaw rate and rudder of 800 samples of a zigzag."""
-    columns = np.array(
-        [(one.t, one.psi, one.r, one.rudder) for one in sailed(800, step)]
-    )
+    rows = [(one.t, one.psi, one.r, one.rudder) for one in sailed(800, step)]
     t, *angles = np.array(rows).T
     psi, r, delta = np.radians(angles)
     return {"t": t, "psi": psi, "r": r, "delta": delta}

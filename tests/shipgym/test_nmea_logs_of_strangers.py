@@ -13,7 +13,6 @@ import pytest
 
 from shipgym import InputError
 from shipgym.trials.guesses import guess_trial
-from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import DEGREE, KNOT
 from tests.shipgym.one_zigzag import SPEED, sailed
@@ -227,21 +226,12 @@ def test_the_talker_with_the_data_is_read(tmp_path):
     said(trial, "psi is from IIHDT (237 values); HEHDT (3 values) left out")
 
 
-def test_sentences_without_checksums_are_read_unless_they_are_required(tmp_path):
+def test_sentences_without_checksums_are_read(tmp_path):
     lines = [line[:-3] for line in plain(rmc, hdt, rsa)]
     lines[301] = lines[301][:9]  # cut short
     trial = read(tmp_path, lines)
     check(trial)
     said(trial, "719 of 720 sentences have no checksum", "1 of 720 sentences with a")
-    required = {"checksums": "required"}
-    with pytest.raises(InputError, match="720 of 720 with a wrong or no checksum"):
-        Trial.from_csv(tmp_path / "log.nmea", sensors=required)
-    (tmp_path / "ship.toml").write_text(
-        "[ship]\nlength = 150.0\n[sensors]\nchecksums = 'required'\n"
-        "[[trials]]\nfile = 'log.nmea'\n"
-    )
-    with pytest.raises(InputError, match="wrong or no checksum"):
-        ShipFile.load(tmp_path / "ship.toml").trials()
 
 
 def test_a_cut_sentence_among_protected_ones_is_left_out(tmp_path):

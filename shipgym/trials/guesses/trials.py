@@ -95,15 +95,14 @@ class TrialGuess:
         return reading
 
 
-def guess_trial(path: str | Path, *, checksums: str = "optional") -> TrialGuess:
+def guess_trial(path: str | Path) -> TrialGuess:
     """Read a log with guesses; where a check proposes another setting, try that.
 
-    A unit given in a column's name is kept unless the positions contradict it. With
-    `checksums` "required" sentences of NMEA 0183 without one count as damaged. What a
+    A unit given in a column's name is kept unless the positions contradict it. What a
     line of a ship file can cure is a decision. Raises InputError, as the readers do,
     for other logs that cannot be read.
     """
-    table = read_log(path, checksums=checksums)
+    table = read_log(path)
     columns: dict[str, ColumnGuess] = {}
     knows_channels = bool(table.units) and table.cells.keys() <= QUANTITIES.keys()
     if not knows_channels:

@@ -74,10 +74,9 @@ def _refuse_foreign(path: Path, content: bytes) -> None:
             raise InputError(f"{path}: expected a log, got {kind['what']}; {step}")
 
 
-def read_log(path: str | Path | LogTable, *, checksums: str = "optional") -> LogTable:
+def read_log(path: str | Path | LogTable) -> LogTable:
     """Read the table in a file, whatever its kind; a table is itself.
 
-    With `checksums` "required" sentences of NMEA 0183 without one count as damaged.
     Raises InputError for a file that is missing, too large, damaged, of no such kind,
     or whose library is missing.
     """
@@ -89,5 +88,5 @@ def read_log(path: str | Path | LogTable, *, checksums: str = "optional") -> Log
     if kind == "messages":
         from shipgym.trials.readers.message_log import read_messages  # with its tables
 
-        return read_messages(path, content, strict=checksums == "required")
+        return read_messages(path, content)
     return with_one_time(_READERS[kind](path, content))

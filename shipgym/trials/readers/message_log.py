@@ -24,20 +24,19 @@ from shipgym.trials.readers.signalk import hear_deltas
 from shipgym.trials.readers.text_files import text_lines
 
 
-def read_messages(path: Path, content: bytes, *, strict: bool = False) -> LogTable:
+def read_messages(path: Path, content: bytes) -> LogTable:
     """Read a log's channels: SI units, positions in degrees, nan where absent.
 
     Of several sources of a channel the best is taken, and a note names the others.
-    `strict` refuses sentences without a checksum. Raises InputError for a damaged log
-    and one without time or channels.
+    Raises InputError for a damaged log and one without time or channels.
     """
     lines, _ = text_lines(path, content)
     heard = Heard()
-    hear_sentences(lines, heard, strict=strict)
+    hear_sentences(lines, heard)
     with placed(str(path)):
         hear_pgns(lines, heard)
     hear_deltas(lines, heard)
-    notes = _check_damage(path, heard, strict=strict) + heard.notes
+    notes = _check_damage(path, heard) + heard.notes
     clock = log_clock(path, heard, notes) if heard.count else None
     of_motion = [name for name in heard.channels if not is_wind(name)]
     fault = ""
@@ -67,17 +66,14 @@ def read_messages(path: Path, content: bytes, *, strict: bool = False) -> LogTab
     return _table(path, tracks, notes, magnetic=chosen.magnetic)
 
 
-def _check_damage(path: Path, heard: Heard, *, strict: bool) -> list[str]:
+def _check_damage(path: Path, heard: Heard) -> list[str]:
     """Refuse a log of many damaged messages; a note of few."""
     damaged = len(heard.damaged)
-    remedy = "the log was damaged on the way: take the original"
-    if strict:
-        remedy = 'write checksums = "optional" if their damage is no concern'
     if damaged > 0.1 * heard.count:
         raise InputError(
             f"{path}: line {heard.damaged[0]}: expected hardly any damaged sentences,"
             f" got {damaged} of {heard.count} with a wrong or no checksum or broken"
-            f" fields, this the first; {remedy}"
+            " fields, this the first; the log was damaged on the way: take the original"
         )
     if not damaged:
         return []

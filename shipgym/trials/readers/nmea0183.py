@@ -84,11 +84,11 @@ class _Found(NamedTuple):
     text: str
 
 
-def hear_sentences(lines: Sequence[str], heard: Heard, *, strict: bool) -> None:
+def hear_sentences(lines: Sequence[str], heard: Heard) -> None:
     """Take times and channels out of the sentences of a log.
 
     A sentence without a checksum is damaged where most of its source have one, or
-    another number of fields; with `strict` in any case.
+    another number of fields.
     """
     found = _find(lines, heard)
     with_checksum = _usual(found, "*")
@@ -96,7 +96,7 @@ def hear_sentences(lines: Sequence[str], heard: Heard, *, strict: bool) -> None:
     lacking = 0
     without_status: list[str] = []
     for line, source, text in found:
-        may_lack = not strict and with_checksum[source] == 0
+        may_lack = with_checksum[source] == 0
         lacks = "*" not in text
         try:
             if lacks and not (may_lack and text.count(",") == commas[source]):
@@ -119,8 +119,7 @@ def hear_sentences(lines: Sequence[str], heard: Heard, *, strict: bool) -> None:
     if lacking:
         heard.notes.append(
             f"{lacking} of {len(found)} sentences have no checksum: nothing protects"
-            ' them from damage on the way (checksums = "required" in [sensors] refuses'
-            " them)"
+            " them from damage on the way"
         )
     if without_status:
         sources = ", ".join(sorted(set(without_status)))
