@@ -1,21 +1,16 @@
 """The course-keeping environment."""
 
-import warnings
 from dataclasses import replace
 
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env as gymnasium_check_env
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
 import shipgym
-from shipgym import InputError
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.random import DRAW, GOLDEN, mix
-from shipgym.envs.engine import Engine
 from shipgym.ships import Envelope
 from shipgym.tasks.contract import Interval
 from shipgym.tasks.scales import OBSERVATION_NAMES, control_interval, observation_scales
@@ -51,24 +46,6 @@ def pd(observation):
     return np.array(
         [np.clip(1.5 * error - 0.7 * observation[2], -1.0, 1.0)], dtype=np.float32
     )
-
-
-@pytest.mark.parametrize("check", [gymnasium_check_env, sb3_check_env])
-def test_conformance_without_a_warning(check):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        env = make().unwrapped
-        check(env)
-    assert env.spec.id == ID
-    assert (env.waypoints, env.corridor, env.turn_radius) == (
-        None,
-        None,
-        None,
-    )  # it has no path
-
-
-def test_registered_by_import_for_worker_processes():
-    assert gymnasium.make(f"shipgym:{ID}", model="mariner").spec.id == ID
 
 
 def test_observation_is_the_scaled_physical_state():
@@ -200,15 +177,6 @@ def test_a_model_that_runs_away_ends_the_episode_with_numbers(mariner):
     assert np.all(np.isfinite(list(env.physical_state().values())))
 
 
-def test_each_lane_may_have_a_ship_of_its_own(mariner):
-    slow = replace(mariner, coefficients={**mariner.coefficients, "N_d": 0.0007})
-    engine = Engine([mariner, slow], 2)
-    engine.reset([1, 1])
-    for _ in range(20):
-        engine.step(np.full((2, 1), 0.5))
-    assert 0.0 < engine.physical_state()["r"][1] < 0.8 * engine.physical_state()["r"][0]
-
-
 def test_scales_follow_the_ship(mariner):
     assert dict(zip(OBSERVATION_NAMES, observation_scales(mariner), strict=True)) == {
         "heading_error_sin": 1.0,
@@ -220,43 +188,6 @@ def test_scales_follow_the_ship(mariner):
         "last_command": pytest.approx(np.radians(40)),
         "heading_error_integral": pytest.approx(np.radians(10) * 10 * 160.93 / 7.7175),
     }
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"sea": "rugh"}, "sea: expected .* got 'rugh'"),
-        ({"model": "no-such-ship"}, "model"),
-        ({"dt": -1.0}, "dt: expected .*got -1"),
-        ({"episode_steps": 0}, "episode_steps: expected .*got 0"),
-        ({"max_heading_error_deg": 400.0}, "max_heading_error_deg: expected .*got 400"),
-    ],
-)
-def test_wrong_arguments(options, message):
-    with pytest.raises(InputError, match=message):
-        make(**options)
-
-
-@pytest.mark.parametrize(
-    ("action", "message"),
-    [
-        (
-            np.array([np.nan], dtype=np.float32),
-            r"action: expected finite numbers .* got \[nan\]",
-        ),
-        (
-            np.array([np.inf], dtype=np.float32),
-            r"action: expected finite numbers .* got \[inf\]",
-        ),
-        (np.zeros(2, dtype=np.float32), r"got shape \(2,\)"),
-        (0.5, r"got shape \(\)"),
-    ],
-)
-def test_wrong_actions(action, message):
-    env = make().unwrapped
-    env.reset(seed=0)
-    with pytest.raises(InputError, match=message):
-        env.step(action)
 
 
 SHIP = Ship(160.0, 8.0, 0.6, 0.05, 0.0, 1.5, np.inf, 8.0)

@@ -198,16 +198,6 @@ def test_discrete_orders_are_the_continuous_ones():
         assert ours[1:] == theirs[1:]
 
 
-@pytest.mark.parametrize("wrong", [-1, 9, 1.0, np.array([1]), None, np.nan])
-def test_an_action_that_is_no_rudder_order_is_refused(wrong):
-    env = make(action="rudder-discrete")
-    env.reset(seed=0)
-    with pytest.raises(
-        InputError, match="expected a member of Discrete\\(9\\): rudder orders"
-    ):
-        env.step(wrong)
-
-
 def test_extrapolating_costs_what_was_asked():
     normal = np.random.default_rng(0).normal
     known = Envelope.from_samples(
@@ -304,29 +294,6 @@ def test_pages_name_every_setting_with_its_default(path):
     assert document_settings.page(text) == text, (
         "run python scripts/document_settings.py"
     )
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (
-            {"speed_range": 0.8},
-            "speed_range: expected the least and the largest, two numbers, got 0.8",
-        ),
-        ({"speed_range": (0.8,)}, "expected the least and the largest, two numbers"),
-        ({"speed_range": (0.0, 1.0)}, "speed_range: the least: expected"),
-        ({"loading_range": (1.2, 0.9)}, "loading_range: the largest: expected"),
-        (
-            {"loading_range": (0.9, 1.1), "model": "kvlcc2"},
-            "expected a ship whose equations are a table of coefficients, got 'kvlcc2",
-        ),
-        ({"ensemble": "kvlcc2"}, "ensemble: expected a list of models, got 'kvlcc2'"),
-        ({"model_uncertainty": "prior"}, "model_uncertainty: expected"),
-    ],
-)
-def test_ranges_that_are_none_are_refused(options, message):
-    with pytest.raises(InputError, match=message):
-        make(**options)
 
 
 PAGES = Path(__file__).parents[2] / "docs" / "environments"

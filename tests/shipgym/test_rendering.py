@@ -6,7 +6,6 @@ import gymnasium
 import numpy as np
 import pytest
 
-from shipgym import InputError
 from shipgym.envs import rendering
 from shipgym.sea import Current, Weather, Wind
 
@@ -113,11 +112,3 @@ def test_videos_are_recorded(tmp_path):
         sailed(env, 5)
         env.close()
     assert [path.suffix for path in folder.iterdir()] == [".mp4"]
-
-
-def test_an_unknown_mode_is_refused():
-    with (
-        warnings.catch_warnings(action="ignore"),
-        pytest.raises(InputError, match=r"render_mode: expected one of .*got 'ansi'"),
-    ):
-        make(COURSE, render_mode="ansi")

@@ -1,8 +1,6 @@
 """The native vector environments: Gymnasium's promises, and the single environments row
 by row."""
 
-from dataclasses import replace
-
 import gymnasium
 import numpy as np
 import pytest
@@ -160,36 +158,6 @@ def test_a_vector_environment_says_what_is_wrong(mariner):
     discrete.reset(seed=0)
     with pytest.raises(InputError, match="rudder orders"):
         discrete.step(np.array([0, 9]))
-
-
-def test_ships_differ_from_episode_to_episode_and_return_with_the_seed():
-    heavy = replace(shipgym.load_model("mariner"), name="heavy")
-    options = {
-        "ensemble": [heavy],
-        "loading_range": (0.5, 2.0),
-        "speed_range": (0.5, 1.0),
-    }
-    env = vector(COURSE, 300, **options)
-    env.reset(seed=0)
-    speeds = env.physical_state()["u"]
-    assert 0.5 <= speeds.min() / 7.7175 < 0.55
-    assert 0.95 < speeds.max() / 7.7175 <= 1.0
-    for _ in range(20):
-        env.step(np.ones((300, 1), dtype=np.float32))
-    rates = env.physical_state()["r"] / speeds
-    assert rates.max() > 2.0 * rates.min() > 0.0
-    env.reset(seed=0)
-    np.testing.assert_array_equal(env.physical_state()["u"], speeds)
-    env.reset()
-    assert not np.array_equal(env.physical_state()["u"], speeds)
-
-
-def test_an_unknown_mode_is_refused():
-    for name, value in (("autoreset_mode", "Never"), ("render_mode", "human")):
-        with pytest.raises(InputError, match=f"{name}: .*expected"):
-            gymnasium.make_vec(
-                "shipgym/CourseKeeping-v0", num_envs=2, model="mariner", **{name: value}
-            )
 
 
 def test_rows_outside_of_a_mask_keep_all_that_they_show():
