@@ -131,8 +131,7 @@ def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
         AttributeError,
         NotImplementedError,
     ) as error:
-        functions = [shared.py_func for shared in SHARED.values()]
-        raise InputError(explanation(error, what, functions)) from None
+        raise InputError(explanation(error, what)) from None
 
 
 def _named(copy: Any) -> Any:

@@ -8,6 +8,7 @@ other globals: hooks are replaced by the functions that fill them, constants suc
 unchanged and can be called from Python.
 """
 
+import builtins
 import dis
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
@@ -115,6 +116,11 @@ class Specialisation:
                 inlined = is_inlined(value) and is_inlined(hook)
                 value = self._inner(value, inlined, checked)
             namespace[name] = value
+        for name in loaded_names(function.__code__):
+            if name not in namespace and not hasattr(builtins, name):
+                raise InputError(
+                    f"{place_of(function)}: NameError: name {name!r} is not defined"
+                )
         return FunctionType(
             function.__code__, namespace, function.__name__, function.__defaults__
         )

@@ -259,7 +259,7 @@ WRONG = [
         "5.0, 3",
         "Observation.yaw_rate: unit: expected a non-empty string, got 3",
     ),
-    ("max(motion.u", "mox(motion.u", "line HERE, in step: NameError: name 'mox'"),
+    ("max(motion.u", "mox(motion.u", "line DEF, in step: NameError: name 'mox'"),
     ("Reward(-off * off, ", "Reward(", "line HERE, in step: TypeError: .*'over_speed'"),
     (
         "Reward(-off",
@@ -381,7 +381,7 @@ def test_what_is_wrong_is_named_and_nothing_is_registered(tmp_path, old, new, me
     [
         (
             "    if x > 3.0:\n        fathom\n",
-            r"in step \(.*fairway.py, line NEXT\): NameError: name 'fathom'",
+            "fairway.py, line DEF, in step: NameError: name 'fathom'",
         ),
         (
             "    if x > 3.0:\n        return 1.0, 2.0\n",
@@ -393,7 +393,7 @@ def test_what_is_wrong_is_named_and_nothing_is_registered(tmp_path, old, new, me
         ),
         (
             "    if x > 3.0:\n        Reward(1.0)\n",
-            r"compiled \(.*fairway.py, line NEXT\): .*'delay'",
+            r"cannot be compiled: .*Reward.*'delay'",
         ),
     ],
 )
