@@ -221,6 +221,12 @@ def _short_name(text: str) -> str:
 def _check_text(text: str) -> None:
     """Refuse a text that names no controller, function or file; nothing is run."""
     known = known_names()
+    if text.endswith(".zip"):
+        raise InputError(
+            f"controllers: '{text}': expected a file that runs no code, got one of"
+            " stable-baselines3; load it there, and write"
+            " LearnedPolicy.from_sb3(agent).save('agent.json')"
+        )
     if text in known or "{task}" in text:
         return
     if names_code(text):

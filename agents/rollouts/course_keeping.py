@@ -26,7 +26,7 @@ RECORDED = ("psi", "delta", "set_point", *course_keeping_task().info_names)
 
 @dataclass(frozen=True, eq=False)
 class Episodes:
-    """Episodes of course keeping, each array of the shape of the seeds.
+    """Episodes of course keeping, each array of shape (n_episodes,).
 
     Attributes
     ----------
@@ -99,8 +99,8 @@ def sail(
     task : Task, optional
         What is asked; by default the environment's own task.
     seeds : array-like of int
-        Seeds of the episodes. With several models: one for all, or of shape
-        (n_models,), one each, or (n_models, n_episodes). With one model any shape.
+        Seeds of the episodes, of shape (n_episodes,), or one; with several models one
+        for each, or one for all.
     allow_unstable : bool
         Whether models that were found unstable when they were identified may be sailed,
         with a warning.
@@ -110,50 +110,30 @@ def sail(
     asked = task or course_keeping_task()
     check_fits(controller, asked, ships[0], f"model '{ships[0].name}'")
 
-    flat = numbers.ravel()
-    owners = np.arange(flat.size) // (flat.size // len(ships))  # ship of each episode
-    at_once = 1024  # recordings of so many take little memory
-    groups = []
-    for first in range(0, flat.size, at_once):
-        some = slice(first, first + at_once)
-        own = [ships[owner] for owner in owners[some]] if len(ships) > 1 else ships
-        engine = Engine(own, len(flat[some]), asked, allow_unstable=allow_unstable)
-        run = rollout(controller, engine, flat[some], record=RECORDED)
-        groups.append(_figures(run))
-
-    figures = {}
-    for name in groups[0]:
-        values = np.concatenate([group[name] for group in groups])
-        figures[name] = values.reshape(numbers.shape)
-    return Episodes(**figures, seeds=numbers)
-
-
-def _figures(run: Rollout) -> dict[str, NDArray[np.generic]]:
-    """Figures of `Episodes`, each of shape (n,)."""
+    engine = Engine(ships, len(numbers), asked, allow_unstable=allow_unstable)
+    run = rollout(controller, engine, numbers, record=RECORDED)
     steered = steering(run)
-    return {
-        "cost": costs(run)["cost"],
-        "heading_rmse_deg": steered["heading_rmse_deg"],
-        "rudder_travel_deg_min": steered["rudder_travel_deg_min"],
-        "extrapolating": mean(run, "extrapolating"),
-        "terminated": run.terminated,
-        "duration_s": run.steps * run.dt,
-    }
+    return Episodes(
+        cost=costs(run)["cost"],
+        heading_rmse_deg=steered["heading_rmse_deg"],
+        rudder_travel_deg_min=steered["rudder_travel_deg_min"],
+        extrapolating=mean(run, "extrapolating"),
+        terminated=run.terminated,
+        duration_s=run.steps * run.dt,
+        seeds=numbers,
+    )
 
 
 def _seeds(seeds: ArrayLike, n_models: int) -> Integers:
-    """Seeds of the episodes, with several models one row for each."""
-    numbers = np.asarray(seeds)
-    if numbers.dtype.kind not in "iu" or numbers.size == 0:
-        raise unexpected("seeds", "integers", seeds)
-    if n_models == 1:
-        return numbers
-    if numbers.ndim == 0:
-        return np.full(n_models, int(numbers))
-    if len(numbers) != n_models:
+    """Seeds of the episodes, with several models one for each."""
+    numbers = np.atleast_1d(np.asarray(seeds))
+    if numbers.dtype.kind not in "iu" or numbers.ndim != 1 or numbers.size == 0:
+        raise unexpected("seeds", "integers in a row", seeds)
+    if n_models > 1 and len(numbers) == 1:
+        return np.repeat(numbers, n_models)
+    if n_models > 1 and len(numbers) != n_models:
         raise InputError(
-            f"seeds: expected shape ({n_models},) or ({n_models}, n_episodes), a row"
-            f" for each model, got {numbers.shape}"
+            f"seeds: expected one for each of {n_models} models, got {len(numbers)}"
         )
     return numbers
 

@@ -205,6 +205,7 @@ def test_those_beyond_a_limit_come_after_those_within(tmp_path):
         ("best-known", "expected one of 'pid'.*got 'best-known'"),
         ("pid,pid", "got 'pid' twice"),
         ("x=nobody.json", "got 'nobody.json'"),
+        ("model.zip", r"LearnedPolicy\.from_sb3\(agent\)\.save\('agent\.json'\)"),
         ("no_such_module:make", "whose module 'no_such_module' is not found"),
         ({"a": 3}, "'a': expected a controller.* got 3"),
         ({"a": [LQ.from_model(MARINER), 3]}, "'a': expected a controller.* got 3"),

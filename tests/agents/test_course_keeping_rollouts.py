@@ -56,23 +56,6 @@ def test_an_episode_depends_on_its_ship_and_seed_alone():
         assert alone.rudder_travel_deg_min[0] == together.rudder_travel_deg_min[i]
 
 
-def test_seeds_give_the_results_their_shape():
-    ships = fleet(3)
-    grid = sail(PILOT, ships, SHORT, seeds=np.arange(12).reshape(3, 4))
-    assert (
-        grid.cost.shape
-        == grid.terminated.shape
-        == grid.heading_rmse_deg.shape
-        == (3, 4)
-    )
-    assert grid.cost[2, 1] == sail(PILOT, ships[2], SHORT, seeds=9).cost
-    assert sail(PILOT, MARINER, SHORT).cost == sail(PILOT, MARINER, SHORT, seeds=0).cost
-    assert grid.seeds.tolist() == np.arange(12).reshape(3, 4).tolist()
-    assert sail(PILOT, ships, SHORT, seeds=7).cost.tolist() == [
-        float(sail(PILOT, ship, SHORT, seeds=7).cost) for ship in ships
-    ]
-
-
 def test_costs_are_those_of_the_environment():
     assert sail(PILOT, MARINER, SHORT.changed(dt=0.5), seeds=0).duration_s == 75.0
     env = gymnasium.make("shipgym/CourseKeeping-v0", model=MARINER, episode_steps=150)
