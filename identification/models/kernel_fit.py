@@ -9,11 +9,12 @@ principal components of the data in feature space.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
 from sklearn.cluster import KMeans
+from sklearn.linear_model import Ridge
 
 from identification.arrays import column_rms
 from identification.estimators.estimator import Estimators
@@ -94,7 +95,7 @@ def fit_kernel(
     blank: ShipModel,
     trials: Sequence[Trial],
     box: GreyBox,
-    inputs: Floats,
+    channels: Sequence[dict[str, Floats]],
     build_rows: Callable[[Structure], Samples],
 ) -> KernelFit:
     """Fit a kernel to what the reference ship of a grey box leaves.
@@ -113,8 +114,8 @@ def fit_kernel(
         To fit.
     box : GreyBox
         Its reference ship is beneath the kernel.
-    inputs : array of shape (n_samples, 4)
-        Inputs of the kernel in the trials (`inputs_of`).
+    channels : sequence of dict
+        `INPUT_CHANNELS` of each trial, smoothed.
     build_rows : callable
         The regression of the trials with a structure.
 
@@ -123,13 +124,7 @@ def fit_kernel(
     InputError
         For too few samples.
     """
-    search = _Search(
-        blank=blank,
-        trials=trials,
-        box=box,
-        build_rows=build_rows,
-        folds=asked.folds,
-    )
+    inputs = np.concatenate([kernel_inputs(one, blank.particulars) for one in channels])
     # lengths in root mean squares of the inputs, the smoothest first
     lengths: Sequence[float] = (2.8, 2.0, 1.4, 1.0, 0.7)
     if asked.length is not None:
@@ -138,39 +133,39 @@ def fit_kernel(
     weights: Sequence[float] = np.geomspace(0.1, 1e4, 6).tolist()
     if asked.C is not None:
         weights = (float(asked.C),)
+
     kernels = _kernels(inputs, asked.centres, lengths)
-    stages = {length: search.stage(kernel) for length, kernel in kernels.items()}
-    choice = search.smoothest(stages, weights)
-    fitted = search.fitted(stages[choice.length], choice.weight)
-    kernel = kernels[choice.length]
-    report = _report(asked.kernel, kernel, choice)
-    return replace(fitted, report=report)
+    stages = {}
+    for length, kernel in kernels.items():
+        model = _without_coefficients(blank, kernel_box(box, kernel))
+        stages[length] = KernelFit(model, build_rows(model.table))
 
+    def error(weight: float, length: float) -> float:
+        return _error_held_out(stages[length], trials, weight, asked.folds)
 
-class _Choice(NamedTuple):
-    """Weight of the errors and length of the kernel, and the errors with these.
+    pairs = list(product(weights, lengths))  # the smoothest first
+    best = pairs[0]
+    errors = {}
+    if len(pairs) > 1:
+        tried = [error(*pair) for pair in pairs]
+        best = most_regularised(pairs, tried)
+        errors["kernel"] = tried[pairs.index(best)]
+    weight, length = best
+    errors["reference"] = error(0.0, length)
 
-    Errors are those of headings held out, with the kernel, where there was a choice,
-    and by the reference ship alone.
-    """
-
-    weight: float
-    length: float
-    errors: dict[str, float]
-
-
-def _report(kind: str, kernel: Kernel, choice: _Choice) -> dict[str, Any]:
-    """What was chosen, for the provenance."""
-    errors = {name: finite(error) for name, error in choice.errors.items()}
-    return {
-        "kind": kind,
+    kernel = kernels[length]
+    report = {
+        "kind": asked.kernel,
         "centres": len(kernel.centres),
         "features": kernel.basis.shape[1],
-        "length": choice.length,
-        "C": choice.weight,
-        "remarks": _remarks(choice.errors),
-        "heading_errors_held_out": errors,
+        "length": length,
+        "C": weight,
+        "remarks": _remarks(errors),
+        "heading_errors_held_out": {
+            name: finite(error) for name, error in errors.items()
+        },
     }
+    return replace(_fitted(stages[length], weight), report=report)
 
 
 def _kernels(
@@ -191,6 +186,58 @@ def _kernels(
         )
         kernels[length] = principal(kernel, inputs)
     return kernels
+
+
+def _without_coefficients(blank: ShipModel, table: Structure) -> ShipModel:
+    """The ship with a table, all coefficients 0."""
+    return replace(
+        blank,
+        structure=table.name,
+        dynamics=table,
+        covariance=None,
+        draws=None,
+        provenance=None,
+        coefficients=dict.fromkeys(table.coefficient_names, 0.0),
+    )
+
+
+def _error_weight(stage: KernelFit, weight: float) -> float:
+    """Weight of the errors of the rows, from that by ship length, prime system."""
+    ship = stage.model.particulars
+    window = np.mean(stage.samples.duration)
+    return float(weight / (ship["length"] * window * ship["speed"] ** 3))
+
+
+def _error_held_out(
+    stage: KernelFit, trials: Sequence[Trial], weight: float, folds: str
+) -> float:
+    """Mean error of the simulated headings of what is held out.
+
+    Weight 0 gives that of the reference ship.
+    """
+    C = _error_weight(stage, weight)
+    errors = []
+    for rows, held in held_out_rows(trials, stage.samples, folds):
+        model = stage.model
+        if weight:
+            ridge = Ridge(1.0 / C, fit_intercept=False)
+            by_equation = stage.samples.select(rows).by_equation()
+            found = {q: ridge.fit(X, y).coef_ for q, X, y in by_equation}
+            model = model.with_accelerations(found)
+        errors.append(heading_error(model, held))
+    return float(np.mean(errors))
+
+
+def _fitted(stage: KernelFit, weight: float) -> KernelFit:
+    """The fit to all rows."""
+    C = _error_weight(stage, weight)
+    estimators: Estimators = {}
+    for q, X, y in stage.samples.by_equation():
+        estimator = LSSVM(C=C, scale=False, fit_intercept=False)
+        estimators[q] = estimator.fit(X, y)
+    coefficients = {q: estimator.coef_ for q, estimator in estimators.items()}
+    model = stage.model.with_accelerations(coefficients)
+    return replace(stage, model=model, estimators=estimators)
 
 
 def _remarks(errors: dict[str, float]) -> list[str]:
@@ -262,125 +309,12 @@ def principal(
     moment = values.T @ values / len(values)
 
     among_centres = gaussians(centres, centres)
-    basis = _leading_directions(moment, among_centres, most_features)
-    return replace(kernel, basis=basis)
-
-
-def _leading_directions(moment: Floats, metric: Floats, most: int) -> Floats:
-    """Directions of the largest moment by a metric, the leading one first."""
-    jitter = 1e-9 * np.eye(len(metric))
-    _, vectors = eigh(moment, metric + jitter)
+    jitter = 1e-9 * np.eye(len(centres))
+    _, vectors = eigh(moment, among_centres + jitter)
     leading_first = vectors[:, ::-1]
-    return np.ascontiguousarray(leading_first[:, :most])
-
-
-def inputs_of(channels: Sequence[dict[str, Floats]], ship: Any) -> Floats:
-    """Inputs of the kernel over several trials, shape (n_samples, 4)."""
-    return np.concatenate([kernel_inputs(one, ship) for one in channels])
+    return replace(kernel, basis=np.ascontiguousarray(leading_first[:, :most_features]))
 
 
 def _thinned(x: Floats, most: int) -> Floats:
     every = max(1, -(-len(x) // most))
     return x[::every]
-
-
-@dataclass(frozen=True, eq=False)
-class _Search:
-    """Fits with different kernels and weights of the errors, and what they predict."""
-
-    blank: ShipModel
-    trials: Sequence[Trial]
-    box: GreyBox
-    build_rows: Callable[[Structure], Samples]
-    folds: str
-
-    def stage(self, kernel: Kernel) -> KernelFit:
-        """The regression, and the model but for its coefficients."""
-        table = kernel_box(self.box, kernel)
-        blank = replace(
-            self.blank,
-            structure=table.name,
-            dynamics=table,
-            covariance=None,
-            draws=None,
-            provenance=None,
-            coefficients=dict.fromkeys(table.coefficient_names, 0.0),
-        )
-        return KernelFit(blank, self.build_rows(table))
-
-    def unit(self, samples: Samples) -> float:
-        """SI units, by row, of a weight of errors by ship length, prime system."""
-        ship = self.blank.particulars
-        window = np.mean(samples.duration)
-        unit = ship["length"] * window * ship["speed"] ** 3
-        return float(1.0 / unit)
-
-    def error(self, stage: KernelFit, weight: float) -> float:
-        """Mean error of the simulated headings of what is held out.
-
-        Weight 0 gives that of the reference ship.
-        """
-        samples = stage.samples
-        C = weight * self.unit(samples)
-        errors = []
-        for rows, held in held_out_rows(self.trials, samples, self.folds):
-            fitted = samples.select(rows)
-            coefficients = {}
-            for q, X, y in fitted.by_equation():
-                coefficients[q] = _ridge(X, y, C)
-
-            model = stage.model.with_accelerations(coefficients)
-            error = heading_error(model, held)
-            errors.append(error)
-        return float(np.mean(errors))
-
-    def smoothest(
-        self, stages: dict[float, KernelFit], weights: Sequence[float]
-    ) -> _Choice:
-        """The smoothest kernel nearly as good as the best.
-
-        The stages are by length, the smoothest first.
-        """
-        pairs = list(product(weights, stages))  # the smoothest first
-        best = pairs[0]
-        errors = {}
-        if len(pairs) > 1:
-            tried = [self.error(stages[length], weight) for weight, length in pairs]
-            best = most_regularised(pairs, tried)
-            place = pairs.index(best)
-            errors["kernel"] = tried[place]
-
-        weight, length = best
-        errors["reference"] = self.error(stages[length], 0.0)
-        return _Choice(
-            weight=weight,
-            length=length,
-            errors=errors,
-        )
-
-    def fitted(self, stage: KernelFit, weight: float) -> KernelFit:
-        """The fit to all rows."""
-        samples = stage.samples
-        C = weight * self.unit(samples)
-        estimators: Estimators = {}
-        coefficients = {}
-        for q, X, y in samples.by_equation():
-            estimator = LSSVM(C=C, scale=False, fit_intercept=False)
-            estimators[q] = estimator.fit(X, y)
-            coefficients[q] = estimator.coef_
-        model = stage.model.with_accelerations(coefficients)
-        return KernelFit(
-            model=model,
-            samples=samples,
-            estimators=estimators,
-        )
-
-
-def _ridge(X: Floats, y: Floats, C: float) -> Floats:
-    """Coefficients by ridge regression with a weight C of the squared errors."""
-    _, n_features = X.shape
-    penalty = np.eye(n_features)
-    moment = X.T @ X * C + penalty
-    projected = C * (X.T @ y)
-    coefficients = np.linalg.solve(moment, projected)
-    return np.asarray(coefficients)

@@ -15,9 +15,7 @@ from identification.models.grey_box import explained_samples
 from identification.models.guard import GuardedFit, reasons_unstable
 from identification.models.kernel_fit import (
     INPUT_CHANNELS,
-    KernelFit,
     fit_kernel,
-    inputs_of,
     stabilised,
 )
 from identification.models.maximum_a_posteriori import (
@@ -112,14 +110,23 @@ def by_kernel(
     beneath = reference_options(options)
     problem = pose(trials, beneath)
     reference, box = _reference_box(trials, beneath, problem)
-    found = _fitted_kernel(kernel, reference, box, problem, options)
+    smoothing = options.preprocessing.smoothing
+    found = fit_kernel(
+        kernel,
+        reference,
+        problem.used,
+        box,
+        [smoothed_channels(one, INPUT_CHANNELS, smoothing) for one in problem.used],
+        lambda table: problem.rows_of(table, reference),
+    )
     problem = replace(
         problem,
         blank=found.model,
         table=found.model.table,
         samples=found.samples,
     )
-    fit = _unguarded(found.model, found.estimators, problem.used)
+    reasons = reasons_unstable(found.model, problem.used)
+    fit = _guard_report(found.model, found.estimators, reasons)
     named = replace(options, structure=beneath.structure)
     provenance = provenance_of(named, name_of(options.method), fit, problem)
     provenance["kernel"] = found.report
@@ -137,27 +144,6 @@ def _reference_box(
     if options.structure == BLACK_BOX:
         model = stabilised(model)
     return model, fitted_box(model)
-
-
-def _fitted_kernel(
-    kernel: KernelResidual,
-    reference: ShipModel,
-    box: GreyBox,
-    problem: Problem,
-    options: Options,
-) -> KernelFit:
-    """The kernel on a reference ship, from inputs smoothed as the options ask for."""
-    used = problem.used
-    smoothing = options.preprocessing.smoothing
-    channels = [smoothed_channels(trial, INPUT_CHANNELS, smoothing) for trial in used]
-    return fit_kernel(
-        kernel,
-        reference,
-        used,
-        box,
-        inputs_of(channels, reference.particulars),
-        lambda table: problem.rows_of(table, reference),
-    )
 
 
 def reference_options(options: Options) -> Options:
@@ -287,13 +273,6 @@ def checked_mmg(options: Options) -> Options:
             " formulas"
         )
     return replace(options, method=MAP)
-
-
-def _unguarded(
-    model: ShipModel, estimators: Estimators, used: Sequence[Trial]
-) -> GuardedFit:
-    """A fit that was not guarded, and whether it runs away."""
-    return _guard_report(model, estimators, reasons_unstable(model, used))
 
 
 def _guard_report(
