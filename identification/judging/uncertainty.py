@@ -13,8 +13,8 @@ class Uncertainty:
     ----------
     covariance : {"analytic", "posterior"}
         From the residuals, taken as correlated between the equations and over the time
-        to sail one ship length; or from a posterior by sampling, draws of which the
-        model keeps.
+        to sail one ship length; or from a posterior by sampling, whose draws the model
+        keeps.
     model_error : bool
         Whether the covariance is scaled until trials left out in turn are predicted
         within it; a posterior always is.
