@@ -132,6 +132,51 @@ def accelerations(
     W_GM = (weight * GM / L) * per_U * per_U
 
     at = State(u, v, r, p, phi)
+    Y_H = hull(
+        at,
+        c.Y_v,
+        c.Y_r,
+        c.Y_p,
+        c.Y_f,
+        c.Y_vvv,
+        c.Y_vvr,
+        c.Y_vvf,
+        c.Y_rrr,
+        c.Y_vrr,
+        c.Y_rrf,
+        c.Y_vff,
+        c.Y_rff,
+    )
+    K_H = hull(
+        at,
+        c.K_v,
+        c.K_r,
+        c.K_p,
+        c.K_f,
+        c.K_vvv,
+        c.K_vvr,
+        c.K_vvf,
+        c.K_rrr,
+        c.K_vrr,
+        c.K_rrf,
+        c.K_vff,
+        c.K_rff,
+    )
+    N_H = hull(
+        at,
+        c.N_v,
+        c.N_r,
+        c.N_p,
+        c.N_f,
+        c.N_vvv,
+        c.N_vvr,
+        c.N_vvf,
+        c.N_rrr,
+        c.N_vrr,
+        c.N_rrf,
+        c.N_vff,
+        c.N_rff,
+    )
     X = (
         c.X_uu * u * u
         + (1.0 - c.t) * T
@@ -142,15 +187,10 @@ def accelerations(
         + c.c_RX * F_N * sin_delta
         + (c.m + c.my) * v * r
     )
-    Y = sway_hull(at, c) + (1.0 + c.a_H) * F_N * cos_delta - (c.m + c.mx) * u * r
-    K = (
-        roll_hull(at, c)
-        - (1.0 + c.a_H) * c.z_R * F_N * cos_delta
-        + c.mx * c.lx * u * r
-        - W_GM * phi
-    )
+    Y = Y_H + (1.0 + c.a_H) * F_N * cos_delta - (c.m + c.mx) * u * r
+    K = K_H - (1.0 + c.a_H) * c.z_R * F_N * cos_delta + c.mx * c.lx * u * r - W_GM * phi
     x_HR = c.x_R + c.a_H * c.x_H
-    N = yaw_hull(at, c) + x_HR * F_N * cos_delta
+    N = N_H + x_HR * F_N * cos_delta
 
     # [m + m_y      -m_y l_y    m_y alpha_y] [vdot]   [Y]
     # [-m_y l_y     I_x + J_x   0          ] [pdot] = [K]
@@ -211,52 +251,37 @@ def rudder_force(
     return -slope * area * (U_R * across), sine, cosine
 
 
-def sway_hull(at: State, c: Any) -> float:
-    """Sway force of the hull, to third order in sway, turn and heel, linear in roll."""
-    v, r, phi = at.v, at.r, at.phi
-    vv, rr, ff = v * v, r * r, phi * phi
-    force: float = (
-        c.Y_v * v
-        + c.Y_r * r
-        + c.Y_p * at.p
-        + c.Y_f * phi
-        + vv * (c.Y_vvv * v + c.Y_vvr * r + c.Y_vvf * phi)
-        + rr * (c.Y_rrr * r + c.Y_vrr * v + c.Y_rrf * phi)
-        + ff * (c.Y_vff * v + c.Y_rff * r)
+def hull(
+    at: State,
+    v: float,
+    r: float,
+    p: float,
+    f: float,
+    vvv: float,
+    vvr: float,
+    vvf: float,
+    rrr: float,
+    vrr: float,
+    rrf: float,
+    vff: float,
+    rff: float,
+) -> float:
+    """Force or moment of the hull by its coefficients.
+
+    To third order in sway, turn and heel, linear in roll.
+    """
+    vv = at.v * at.v
+    rr = at.r * at.r
+    ff = at.phi * at.phi
+    return (
+        v * at.v
+        + r * at.r
+        + p * at.p
+        + f * at.phi
+        + vv * (vvv * at.v + vvr * at.r + vvf * at.phi)
+        + rr * (rrr * at.r + vrr * at.v + rrf * at.phi)
+        + ff * (vff * at.v + rff * at.r)
     )
-    return force
-
-
-def roll_hull(at: State, c: Any) -> float:
-    """Roll moment of the hull, in the same terms."""
-    v, r, phi = at.v, at.r, at.phi
-    vv, rr, ff = v * v, r * r, phi * phi
-    moment: float = (
-        c.K_v * v
-        + c.K_r * r
-        + c.K_p * at.p
-        + c.K_f * phi
-        + vv * (c.K_vvv * v + c.K_vvr * r + c.K_vvf * phi)
-        + rr * (c.K_rrr * r + c.K_vrr * v + c.K_rrf * phi)
-        + ff * (c.K_vff * v + c.K_rff * r)
-    )
-    return moment
-
-
-def yaw_hull(at: State, c: Any) -> float:
-    """Yaw moment of the hull, in the same terms."""
-    v, r, phi = at.v, at.r, at.phi
-    vv, rr, ff = v * v, r * r, phi * phi
-    moment: float = (
-        c.N_v * v
-        + c.N_r * r
-        + c.N_p * at.p
-        + c.N_f * phi
-        + vv * (c.N_vvv * v + c.N_vvr * r + c.N_vvf * phi)
-        + rr * (c.N_rrr * r + c.N_vrr * v + c.N_rrf * phi)
-        + ff * (c.N_vff * v + c.N_rff * r)
-    )
-    return moment
 
 
 def shaft_acceleration(n: float, command: float, c: Any, ship: Ship) -> float:
