@@ -184,7 +184,7 @@ def number_of_steps(duration: float, dt: float) -> int:
     return steps
 
 
-def ship_length(trial: Trial, length: float | None) -> float:
+def ship_length(trial: Trial, length: float | None = None) -> float:
     """The given length, or the trial's own, m."""
     known = trial.length if length is None else length
     if known is None:

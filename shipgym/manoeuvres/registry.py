@@ -12,7 +12,7 @@ from shipgym.checks import check_text
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.models.by_name import takes_name
 from shipgym.models.ship_model import ShipModel
-from shipgym.trials.trial import KINDS, Trial
+from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -89,9 +89,7 @@ class Family:
 FAMILIES: dict[str, Family] = {}
 
 
-def register_manoeuvre(
-    name: str, variants: Variants, title: str = "", kind: str | None = None
-) -> None:
+def register_manoeuvre(name: str, variants: Variants, title: str = "") -> None:
     """Register a family of manoeuvres.
 
     `standard_manoeuvres`, `index_intervals` and `shipgym trials` then know it.
@@ -108,8 +106,6 @@ def register_manoeuvre(
         chosen for the ship there.
     title : str
         Heading on pages; by default the name.
-    kind : str, optional
-        A further ``kind`` that trials and ship files may name, such as ``"zigzag"``.
     """
     check_text(name, "manoeuvre: name")
     if name in FAMILIES:
@@ -118,9 +114,6 @@ def register_manoeuvre(
         )
     title = title or name.capitalize()
     FAMILIES[name] = Family(title, variants)
-    if kind is not None and kind not in KINDS:
-        check_text(kind, "manoeuvre: kind")
-        KINDS.append(kind)
 
 
 def families_of(

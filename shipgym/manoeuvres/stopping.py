@@ -37,7 +37,6 @@ def stopping(
     model: ShipModel,
     shaft_speed: float = 0.0,
     speed_ratio: float = 0.1,
-    dt: float | None = None,
     water_depth: float = np.inf,
 ) -> Trial:
     """Simulate a stop from service speed, rudder amidships, until the ship is slow.
@@ -50,8 +49,8 @@ def stopping(
 
     The shaft is ordered to `shaft_speed`, 1/s, 0 for stopped, negative for astern. The
     trial ends at `speed_ratio` of the surge speed at service, 0 for dead in the water,
-    which only a shaft astern brings about. Samples are `dt` apart, s, by default a
-    fortieth of the time to travel one ship length; the water depth is in m.
+    which only a shaft astern brings about. Samples are a fortieth of the time to
+    travel one ship length apart; the water depth is in m.
 
     Raises InputError for a ship whose propeller is not in its equations, an order
     astern where they do not hold, an order that does not slow the ship down, or dead in
@@ -60,14 +59,11 @@ def stopping(
     UnstableModelError if the ship runs away.
     """
     order = stopping_order(model, shaft_speed, speed_ratio)
-    length_time = model.travel_time
-    step = length_time / 40
-    if dt is not None:
-        step = check_number(dt, "dt", above=0.0, at_most=length_time)
+    n_steps = 40  # of a ship length
+    step = model.travel_time / n_steps
     target = speed_ratio * model.particulars["speed"]
 
     passage = Passage(model, Conditions(water_depth), step)
-    n_steps = max(round(length_time / step), 2)  # of a ship length
     held = np.tile([0.0, order], (n_steps, 1))
     column = model.state_names.index("u")
     states = passage.states(model.service_state, 0)

@@ -60,18 +60,14 @@ def mariner(service_speed: float = 7.7175) -> ShipModel:
     )
 
 
-def container(rudder_limit_deg: float = 35.0) -> ShipModel:
+def container() -> ShipModel:
     """Container ship S175 (SR108), 4 degrees of freedom."""
-    model = model_of(get_equations("container"))
-    steering = replace(model.steering, rudder_limit_deg=rudder_limit_deg)
-    return replace(model, steering=steering)
+    return model_of(get_equations("container"))
 
 
-def tanker(rudder_limit_deg: float = 35.0) -> ShipModel:
+def tanker() -> ShipModel:
     """Esso 190 000 dwt tanker, deep and shallow water."""
-    model = model_of(get_equations("tanker"))
-    steering = replace(model.steering, rudder_limit_deg=rudder_limit_deg)
-    return replace(model, steering=steering)
+    return model_of(get_equations("tanker"))
 
 
 def kvlcc2() -> ShipModel:
@@ -205,9 +201,8 @@ def grey_box(
     reference: str | ShipModel,
     equations: Mapping[str, str | tuple[Term, ...]] | None = None,
     shaft: bool | None = None,
-    name: str = "grey-box",
 ) -> GreyBox:
-    """A reference ship plus a table of terms, as a structure of a given name.
+    """A reference ship plus a table of terms, as a structure.
 
     The reference is a shipped model's name, the path of a model file, or a model. The
     terms, by equation `u`, `v`, `r`, are in units of service speed (`read_terms`), by
@@ -231,7 +226,7 @@ def grey_box(
 
     bare = replace(ship, covariance=None, draws=None, envelope=None, provenance=None)
     return GreyBox(
-        name=name,
+        name="grey-box",
         source=SOURCE,
         equations=table,
         normalisation="service",
@@ -252,14 +247,13 @@ def converted_model(
     particulars: Particulars,
     steering: SteeringGear,
     service_shaft_speed: float = 0.0,
-    name: str | None = None,
 ) -> ShipModel:
     """Reference ship as a model of another ship: a grey box whose terms are zero.
 
     The reference is as in `grey_box`, or a grey box; particulars (with the service
-    speed), steering gear, shaft speed at service speed (1/s) and name are those of the
-    target. A shaft speed of 0 is not known: the reference ship's is taken as at service
-    speed.
+    speed and the name), steering gear and shaft speed at service speed (1/s) are those
+    of the target. A shaft speed of 0 is not known: the reference ship's is taken as at
+    service speed.
     """
     if isinstance(reference, str | ShipModel):
         box = grey_box(reference)
@@ -267,7 +261,7 @@ def converted_model(
     else:
         box = reference
     return ShipModel(
-        name=particulars.name if name is None else name,
+        name=particulars.name,
         structure=box.name,
         particulars=particulars,
         steering=steering,

@@ -19,7 +19,6 @@ def scale_model(
     model: ShipModel,
     length: float,
     speed: float | None = None,
-    water_density: float | None = None,
 ) -> ShipModel:
     """A geometrically similar ship of another length, at another service speed.
 
@@ -28,8 +27,8 @@ def scale_model(
     a ship length; the steering gear follows. Scale effects (friction, wake) are not
     estimated.
 
-    Raises InputError for a length, speed or density that is not positive, and for
-    reference ships, whose equations are written for one length.
+    Raises InputError for a length or speed that is not positive, and for reference
+    ships, whose equations are written for one length.
 
     Parameters
     ----------
@@ -39,8 +38,6 @@ def scale_model(
         Of the new ship, m.
     speed : float, optional
         Its service speed, m/s; by default that of the same Froude number.
-    water_density : float, optional
-        Of its water, kg/m3; by default as it was.
 
     Notes
     -----
@@ -74,12 +71,7 @@ def scale_model(
     scaled = replace(
         model,
         steering=gear,
-        particulars=_particulars(
-            model.particulars,
-            size,
-            speed,
-            water_density,
-        ),
+        particulars=_particulars(model.particulars, size, speed),
         envelope=_envelope(model.envelope, fast, quick),
         provenance=(model.provenance or {}) | {"scaled": origin},
         service_shaft_speed=model.service_shaft_speed * fast / size,
@@ -136,9 +128,7 @@ def _coefficient_factors(
     return factors
 
 
-def _particulars(
-    ship: Particulars, size: float, speed: float, water_density: float | None
-) -> Particulars:
+def _particulars(ship: Particulars, size: float, speed: float) -> Particulars:
     changes: dict[str, Any] = {
         "speed": speed,
         "length": ship.length * size,
@@ -149,9 +139,4 @@ def _particulars(
             changes[name] = value * size**limits.growth
     if ship.mass is not None:
         changes["mass"] = ship.mass * size**3
-    if water_density is not None:
-        changes["water_density"] = water_density
-        if ship.mass is not None:
-            denser = water_density / ship.require("water_density")
-            changes["mass"] *= denser
     return replace(ship, **changes)

@@ -28,10 +28,10 @@ from shipgym.plots.trials import CHANNEL_AXES, history_figure, thinned
 from shipgym.trials.trial import Trial
 
 
-def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
+def zigzag_figure(trial: Trial) -> Figure:
     """Plot a zigzag: heading change and rudder over time, with the switch headings.
 
-    Of a trial with psi and delta; height in pixels.
+    Of a trial with psi and delta.
     """
     t = trial.t
     psi = trial["psi"]
@@ -58,28 +58,25 @@ def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
 
     title = axis("heading change and rudder, deg", zero=True)
     panel = Panel(lines, "time, s", title)
-    return panels([panel], height)
+    return panels([panel], height=320)
 
 
-def turning_figure(
-    trial: Trial, length: float | None = None, height: int = 480
-) -> Figure:
+def turning_figure(trial: Trial) -> Figure:
     """Plot a turning circle, with advance, transfer and tactical diameter marked.
 
     In ship lengths, from the position and along the heading at which the rudder was
-    ordered. The trial has x, y, psi, u, v, r and delta (or delta_command); `length` is
-    that between perpendiculars, m, by default the trial's own. Raises InputError if a
-    channel or the length is missing.
+    ordered. The trial has x, y, psi, u, v, r and delta (or delta_command). Raises
+    InputError if a channel or the ship's length is missing.
     """
-    indices = turning_indices(trial, length)
-    track = track_from_order(trial, ship_length(trial, length))
+    indices = turning_indices(trial)
+    track = track_from_order(trial, ship_length(trial))
     path = line(track.aside, track.ahead, "path", MODEL, 2.0)
     panel = Panel(
         [path, *_turning_dimensions(indices, track)],
         x=axis("to starboard, ship lengths", zero=True),
         y=axis("ahead, ship lengths", zero=True, scaleanchor="x", scaleratio=1),
     )
-    return panels([panel], height, hovermode="closest")
+    return panels([panel], height=480, hovermode="closest")
 
 
 def _turning_dimensions(indices: TurningIndices, track: TrackFromOrder) -> list[Any]:
@@ -122,14 +119,12 @@ def _dimension(x: list[float], y: list[float], name: str, colour: str) -> Any:
     )
 
 
-def speed_figure(
-    trial: Trial, length: float | None = None, height: int = 380
-) -> Figure:
+def speed_figure(trial: Trial) -> Figure:
     """Plot a stop: surge speed over the distance sailed and over time.
 
-    The trial has u and v; `length` as in `turning_figure`.
+    The trial has u, v and the ship's length.
     """
-    sailed = distance_sailed(trial) / ship_length(trial, length)
+    sailed = distance_sailed(trial) / ship_length(trial)
     part = thinned(trial)
     u = trial["u"][part]
     title = axis(CHANNEL_AXES["u"].title, zero=True)
@@ -139,7 +134,7 @@ def speed_figure(
         (trial.t[part], "time, s"),
     ):
         shown.append(Panel([line(x, u, "surge speed", MODEL)], label, title))
-    return panels(shown, height, columns=2, hovermode="closest")
+    return panels(shown, height=380, columns=2, hovermode="closest")
 
 
 def manoeuvre_figure(sailed: Trial) -> Figure:

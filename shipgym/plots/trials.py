@@ -110,11 +110,10 @@ def _history(trials: Mapping[str, Trial], channel: str) -> Panel:
     return Panel(lines, "time, s", title)
 
 
-def path_figure(trials: Mapping[str, Trial], height: int = 460) -> Figure:
+def path_figure(trials: Mapping[str, Trial]) -> Figure:
     """Plot paths seen from above, north up, to one scale, by the label of their line.
 
-    Trials without x and y are left out; InputError if no trial has a position. Height
-    in pixels.
+    Trials without x and y are left out; InputError if no trial has a position.
     """
     styles = line_styles(trials)
     tracks = []
@@ -136,4 +135,4 @@ def path_figure(trials: Mapping[str, Trial], height: int = 460) -> Figure:
         x=to_east,
         y=axis(to_north, scaleanchor="x", scaleratio=1),
     )
-    return panels([panel], height, hovermode="closest")
+    return panels([panel], height=460, hovermode="closest")

@@ -44,19 +44,16 @@ class WaveDrift:
     standard_deviation: float
 
 
-def wave_drift(
-    waves: Waves, particulars: Particulars, speed: float | None = None
-) -> WaveDrift:
+def wave_drift(waves: Waves, particulars: Particulars) -> WaveDrift:
     """Mean second-order forces in an irregular sea: 2 integral S(w) F(w) / a^2 dw.
 
     Surge by :func:`added_resistance`, sway and yaw by :func:`reflection_coefficients`;
     the direction of the waves does not matter here. Particulars are estimated where
     absent (:func:`shipgym.sea.estimates.weather_particulars`), InputError if they are
-    too few; speed in m/s, by default that of service, or 0 where that is not known.
+    too few. The ship has her service speed, or 0 where that is not known.
     """
     ship = weather_particulars(particulars)
-    if speed is None:
-        speed = ship.speed or 0.0
+    speed = ship.speed or 0.0
     chi = half_circle()
     omega = frequencies(waves)
     spectrum = wave_spectrum(waves, omega)

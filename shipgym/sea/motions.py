@@ -88,17 +88,14 @@ class WaveMotion:
     roll_variance: Floats
 
 
-def wave_motion(
-    waves: Waves, particulars: Particulars, speed: float | None = None
-) -> WaveMotion:
+def wave_motion(waves: Waves, particulars: Particulars) -> WaveMotion:
     """Variance of wave-induced heading and roll for waves from all directions.
 
     Particulars are estimated where absent, as in :func:`shipgym.sea.wave_drift`. Roll
-    meets the waves at `speed`, m/s, by default that of service, or 0 where that is
-    not known.
+    meets the waves at service speed, or 0 where that is not known.
     """
     ship = weather_particulars(particulars)
-    U = (ship.speed or 0.0) if speed is None else speed
+    U = ship.speed or 0.0
     chi = half_circle()[:, None]
     omega = frequencies(waves)
     spectrum = wave_spectrum(waves, omega)

@@ -103,26 +103,24 @@ def _ellipsoid_of(samples: bytes) -> tuple[Floats, Floats]:
     return smallest_ellipsoid(points)
 
 
-def smallest_ellipsoid(
-    points: Floats, tolerance: float = 1e-3
-) -> tuple[Floats, Floats]:
+def smallest_ellipsoid(points: Floats) -> tuple[Floats, Floats]:
     """Ellipsoid of least volume around points (Khachiyan; Todd & Yildirim 2007).
 
     The points, shape (n_points, n_dimensions), are scaled to ranges near 1; the
-    algorithm stops at a relative excess `tolerance` of the largest distance. Returns
+    algorithm stops at a relative excess of 1e-3 of the largest distance. Returns
     the centre c, shape (n_dimensions,), and the positive definite Q of (z - c)' Q (z -
     c) <= 1.
     """
     d = points.shape[1]
     floor = 1e-6 * np.eye(d)
-    weights = _khachiyan_weights(points, floor, tolerance)
+    weights = _khachiyan_weights(points, floor)
     centre = weights @ points
     second_moment = points.T @ (weights[:, None] * points)
     scatter = second_moment - np.outer(centre, centre) + floor
     return centre, np.linalg.inv(scatter) / d
 
 
-def _khachiyan_weights(points: Floats, floor: Floats, tolerance: float) -> Floats:
+def _khachiyan_weights(points: Floats, floor: Floats) -> Floats:
     """Weights of the points whose moments are those of the ellipsoid."""
     n, d = points.shape
     lifted = np.column_stack([points, np.ones(n)])
@@ -135,7 +133,7 @@ def _khachiyan_weights(points: Floats, floor: Floats, tolerance: float) -> Float
         distances = np.einsum("ij,ij->i", lifted @ inverse, lifted)
         farthest = int(np.argmax(distances))
         distance = distances[farthest]
-        if distance / (d + 1.0) - 1.0 <= tolerance:
+        if distance / (d + 1.0) - 1.0 <= 1e-3:
             break
         step = (distance - d - 1.0) / ((d + 1.0) * (distance - 1.0))
         weights *= 1.0 - step

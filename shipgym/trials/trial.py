@@ -34,9 +34,8 @@ from shipgym.trials.resampling import FEWEST_SAMPLES, Log
 from shipgym.trials.trial_import import import_tables
 from shipgym.trials.units import CHANNELS, check_channel
 
-#: Kinds of manoeuvre that a trial may name; `shipgym.manoeuvres.register_manoeuvre`
-#: adds a user's own.
-KINDS = [
+#: Kinds of manoeuvre that a trial may name.
+KINDS = (
     "zigzag",
     "turning-circle",
     "spiral",
@@ -44,7 +43,7 @@ KINDS = [
     "straight",
     "captive",
     "random",
-]
+)
 
 #: What a trial is used for.
 USES = ("fit", "validate", "skip")

@@ -7,9 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from agents.cli import app
-from shipgym import InputError, ShipFile, load_model, manoeuvres
+from shipgym import InputError, load_model, manoeuvres
 from shipgym.manoeuvres.standard import FAMILIES
-from shipgym.trials.trial import KINDS
 
 PARALLEL_SHIFT = '''
 """The parallel course manoeuvre.
@@ -36,7 +35,7 @@ def parallel_shift(model, rudder_deg=10.0, water_depth=np.inf):
     rudder = np.radians(rudder_deg) * np.repeat([1.0, -1.0, 0.0], [100, 100, 50])
     commands = np.repeat(model.service_command[None], len(rudder), axis=0)
     commands[:, 0] = rudder
-    return model.simulate(commands, dt).with_(kind="parallel-shift")
+    return model.simulate(commands, dt)
 
 
 def shift_indices(trial):
@@ -49,9 +48,7 @@ def variants(model, water_depth=np.inf):
         parallel_shift, shift_indices, ShiftIndices, "Heading and rudder in degrees.")}
 
 
-manoeuvres.register_manoeuvre(
-    "shifts", variants, "Parallel courses", kind="parallel-shift"
-)
+manoeuvres.register_manoeuvre("shifts", variants, "Parallel courses")
 '''
 
 
@@ -64,7 +61,6 @@ def shifts(tmp_path):
     spec.loader.exec_module(module)
     yield module
     del FAMILIES["shifts"]
-    KINDS.remove("parallel-shift")
 
 
 def test_a_manoeuvre_from_a_folder_of_ones_own_is_sailed_and_reported(shifts, tmp_path):
@@ -88,22 +84,10 @@ def test_a_manoeuvre_from_a_folder_of_ones_own_is_sailed_and_reported(shifts, tm
     assert "Heading and rudder in degrees." in page.read_text()
 
 
-def test_its_indices_have_intervals_and_its_trials_a_kind(shifts, tmp_path):
+def test_its_indices_have_intervals(shifts):
     model = load_model("mariner-tls-svm")
     found = manoeuvres.index_intervals(model, "parallel shift to starboard", n_draws=4)
     assert found["heading_change_deg"].interval is not None
-    trial = shifts.parallel_shift(model)
-    trial.to_csv(tmp_path / "shift.csv")
-    ship = tmp_path / "ship.toml"
-    ship.write_text(
-        '[ship]\nlength = 160.93\n[[trials]]\nfile = "shift.csv"\nkind ='
-        ' "parallel-shift"\n'
-    )
-    assert (
-        [read.kind for read in ShipFile.load(ship).trials()]
-        == [trial.kind]
-        == ["parallel-shift"]
-    )
 
 
 def test_a_name_is_registered_once(shifts):

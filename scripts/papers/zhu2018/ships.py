@@ -37,8 +37,12 @@ ORDERS = {
 @cache
 def ship(rudder_limit_deg: float = 35.0) -> ShipModel:
     """The container ship at the thesis' speed."""
-    reference = container(rudder_limit_deg)
-    return replace(reference, particulars=replace(reference.particulars, speed=SPEED))
+    reference = container()
+    return replace(
+        reference,
+        particulars=replace(reference.particulars, speed=SPEED),
+        steering=replace(reference.steering, rudder_limit_deg=rudder_limit_deg),
+    )
 
 
 @cache
