@@ -114,14 +114,6 @@ def corrected(trials: list[Trial], reference: ShipModel) -> IdentificationResult
     return fit(trials, method="rm-svm", reference_model=reference, kernel=kernel)
 
 
-def test_summary_and_report_of_a_kernel_ship_name_its_basis(
-    corrected: IdentificationResult,
-) -> None:
-    basis = "32 radial basis functions of length 2"
-    assert basis in corrected.summary()
-    assert basis in report_page(corrected)
-
-
 @pytest.fixture(scope="module")
 def black_box(trials: list[Trial]) -> IdentificationResult:
     return fit(trials)

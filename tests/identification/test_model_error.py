@@ -13,7 +13,6 @@ from identification.judging.warnings import held_out_error
 from identification.samples.prediction import predict
 from shipgym import ShipModel, Trial
 from shipgym.manoeuvres import zigzag, zigzag_indices
-from shipgym.models.simulate import simulate
 
 
 def made_up(n: int = 60) -> Samples:
@@ -68,26 +67,6 @@ def test_closed_loop_overshoots_do_not_depend_on_the_neutral_helm(
     assert found.overshoot_1_deg == pytest.approx(truth.overshoot_1_deg, abs=0.25)
     assert error < 0.4
     assert error < 0.5 * abs(open_loop.overshoot_2_deg - truth.overshoot_2_deg)
-
-
-def test_a_ship_that_was_steered_on_the_approach_predicts_her_own_zigzag(
-    mariner: ShipModel,
-) -> None:
-    """A minute of helm to and fro before the order leaves the overshoots measured."""
-    helm = np.radians(1.2) * np.sin(np.arange(60.0) / 6.0)
-    ordered = np.r_[
-        helm, zigzag(mariner, 10, 10, duration=500, dt=1.0)["delta_command"][:-1]
-    ]
-    run = simulate(mariner, ordered[:, None], 1.0, None, np.inf, "zigzag")
-    trial = Trial(
-        run.t,
-        {name: run[name] for name in ("x", "y", "psi", "u", "v", "r", "delta")},
-        kind="zigzag",
-    )
-    again = closed_loop(mariner, trial)
-    truth, found = (zigzag_indices(one, 160.93, 10.0) for one in (trial, again))
-    assert found.overshoot_1_deg == pytest.approx(truth.overshoot_1_deg, abs=0.15)
-    assert found.overshoot_2_deg == pytest.approx(truth.overshoot_2_deg, abs=0.15)
 
 
 def test_the_worst_errors_on_trials_held_out_are_said(

@@ -71,24 +71,3 @@ def test_outliers_and_short_dropouts_are_repaired_and_told(
 def test_clean_trials_are_left_alone(cao_zigzag: Trial) -> None:
     assert repaired(cao_zigzag) is cao_zigzag
     assert cao_zigzag.raw is cao_zigzag
-
-
-@pytest.mark.parametrize("step", [0.1, 10.0])
-@pytest.mark.parametrize(
-    ("hole", "missing"),
-    [(1.0, 0), (1.45, 0), (1.55, 1), (2.0, 1), (10.0, 9), (10.45, 9), (10.52, 0)],
-)
-def test_steps_of_one_and_a_half_to_ten_and_a_half_usual_ones_are_filled(
-    step: float, hole: float, missing: int
-) -> None:
-    """At the usual step, straight where the channel is; a longer one stays a gap."""
-    usual = np.arange(60.0)
-    t = step * np.concatenate([usual, usual + usual[-1] + hole])
-    straight = 3.0 + 0.01 * t
-    found = repaired(Trial(t, {"u": straight}, name="hole"))
-    assert len(found) == len(t) + missing
-    assert set(t) <= set(found.t)
-    assert found.repaired == ({"u": missing} if missing else {})
-    inside = found.t[59 : 61 + missing]
-    np.testing.assert_allclose(np.diff(inside), step * hole / (missing + 1))
-    np.testing.assert_allclose(found["u"], 3.0 + 0.01 * found.t)

@@ -17,14 +17,9 @@ from identification import (
     TruncatedLSSVM,
     Uncertainty,
 )
-from identification.models.methods import METHODS, method_options
-from identification.pipeline.options import STAGES
 from identification.pipeline.reading import (
-    ARGUMENTS,
-    full_name,
     identify_arguments,
     read_table,
-    stage_settings,
 )
 from shipgym import InputError
 
@@ -90,20 +85,6 @@ def test_settings_are_those_of_the_method_that_is_named() -> None:
     refined = read({"method": table})["method"]
     assert isinstance(refined, Refinement)
     assert (refined.pull, refined.start.rank) == (0.1, 3)
-
-
-def test_every_setting_of_every_method_is_an_option_by_its_own_name() -> None:
-    known = stage_settings()
-    for name in METHODS:
-        for option in method_options(name):
-            assert full_name(option, WHERE) == f"method.{option}"
-    assert full_name("folds", WHERE, with_kernel=True) == "kernel.folds"
-    for stage in STAGES:
-        assert full_name(stage, WHERE) == stage
-        for setting in known[stage]:
-            assert full_name(f"{stage}.{setting}", WHERE) == f"{stage}.{setting}"
-            assert full_name(f"{stage}_{setting}", WHERE) == f"{stage}.{setting}"
-    assert {"structure", "reference_model", "hold_out", "current"} <= set(ARGUMENTS)
 
 
 @pytest.mark.parametrize(

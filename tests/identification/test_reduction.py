@@ -7,19 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from identification import build_samples
-from identification.design.reduced import reduce, reduced_structure
 from identification.design.reduction import (
     backward_elimination,
 )
 from shipgym import (
     InputError,
     Particulars,
-    ShipModel,
-    SteeringGear,
 )
-from shipgym.manoeuvres import zigzag
-from shipgym.ships import get_structure
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 NAMES = tuple("abcdefgh")
@@ -60,35 +54,6 @@ TRUE = {
     "c_|v|r": -0.03,
     "c_d": 3.7e-3,
 }
-
-
-def virtual_ship(name: str = "steering5") -> ShipModel:
-    names = get_structure(name).coefficient_names
-    own = {**dict.fromkeys(names, 0.0), **TRUE}
-    own = {c: own[c] for c in names}
-    return ShipModel("virtual", name, PARTICULARS, SteeringGear(35.0, 5.0, 1.0), own)
-
-
-def test_the_terms_of_a_virtual_ship_are_found_among_more() -> None:
-    """A ship of four terms an equation, looked at with seven."""
-    table = get_structure("steering7")
-    rng = np.random.default_rng(0)
-    trials = [
-        zigzag(virtual_ship(), a, a, duration=600, dt=0.5).with_(name=f"{a}")
-        for a in (10, 20, 35)
-    ]
-    samples = build_samples(
-        trials, table, PARTICULARS, "integral", window=20, smoothing="none"
-    )
-    for target in samples.targets.values():
-        target += 2e-4 * np.std(target) * rng.standard_normal(len(target))
-    found = reduce(samples, table, tolerance=1e-6)
-    small = reduced_structure(table, found, "small")
-    for q in ("v", "r"):
-        assert found[q].path[found[q].chosen].held_out > 0.9999
-        assert {t.name for t in small.terms(q)} <= {t.name for t in table.terms(q)}
-        assert len(small.terms(q)) < 7
-    np.testing.assert_allclose(found["r"].coefficients["c_d"], TRUE["c_d"], rtol=0.02)
 
 
 def test_what_cannot_be_reduced_is_named() -> None:

@@ -58,17 +58,6 @@ def test_irregular_samples_and_windows_satisfy_it_too(
         assert samples.window == window
 
 
-def test_trials_are_stacked_with_their_own_steps_and_never_across(
-    mariner: ShipModel, record: Callable[..., Trial]
-) -> None:
-    run = zigzag(mariner, 20, 20, duration=200, dt=0.1)
-    trials = [record(run, every=5, name="a"), record(run, every=10, name="b")]
-    samples = build_samples(trials, mariner.table, mariner.particulars)
-    assert np.bincount(samples.trial).tolist() == [400, 200]
-    assert np.unique(samples.duration.round(9)).tolist() == [0.5, 1.0]
-    assert mismatch(mariner, samples) < 1e-4
-
-
 def test_window_follows_the_noise(
     mariner: ShipModel, cao_zigzag: Trial, noisy_trials: list[Trial]
 ) -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from identification.samples.prediction import predict, with_start
 from shipgym import Trial, load_model
-from shipgym.manoeuvres import turning_circle, zigzag
+from shipgym.manoeuvres import turning_circle
 
 
 def as_derived(run, spoiled, drop=()):
@@ -29,16 +29,3 @@ def test_a_start_that_was_derived_wrong_is_found_again(drop):
     assert all(np.array_equal(found[name][1:], log[name][1:]) for name in "uvr")
     again = predict(ship, log)
     assert np.degrees(np.abs(again["psi"] - run["psi"]).max()) < 0.05
-
-
-def test_noise_of_a_log_leaves_a_start_within_its_own_size():
-    ship = load_model("mariner")
-    run = zigzag(ship, duration=300.0, dt=1.0)
-    rng = np.random.default_rng(3)
-    noisy = run.with_channels(
-        {"psi": run["psi"] + np.radians(0.1) * rng.standard_normal(len(run))}
-        | {name: run[name] + 0.3 * rng.standard_normal(len(run)) for name in "xy"}
-    )
-    found = with_start(ship, as_derived(noisy, {"v": 0.5, "r": 0.008}))
-    assert abs(found["v"][0]) < 0.1
-    assert abs(found["r"][0]) < 0.001

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sklearn.linear_model import Ridge
 
 from identification import (
     LSSVM,
@@ -12,10 +11,6 @@ from identification import (
     GridSearch,
     ParticleSwarm,
     TunedLSSVM,
-)
-from identification.estimators.objectives import (
-    held_out_error,
-    time_blocks,
 )
 from identification.estimators.search import Optimiser
 from shipgym import InputError
@@ -67,30 +62,6 @@ def test_search_is_a_function_of_its_seed(optimiser: Any) -> None:
     )
     np.testing.assert_array_equal(first.x, again.x)
     assert isinstance(optimiser, GridSearch) or not np.array_equal(first.x, other.x)
-
-
-@pytest.mark.parametrize("fit_intercept", [True, False])
-@pytest.mark.parametrize("scale", [True, False])
-def test_held_out_error_is_that_of_fits_one_by_one(
-    fit_intercept: bool, scale: bool
-) -> None:
-    X, y = regression()
-    blocks = time_blocks(len(y), 5)
-    error = held_out_error(X, y, scale, fit_intercept, blocks)
-    for C in (1e-3, 1.0, 1e6):
-        squares = []
-        for k in range(5):
-            away = blocks == k
-            estimator = LSSVM(C=C, scale=scale, fit_intercept=fit_intercept).fit(
-                X[~away], y[~away]
-            )
-            squares.extend((y[away] - estimator.predict(X[away])) ** 2)
-            if not scale:
-                oracle = Ridge(alpha=1.0 / C, fit_intercept=fit_intercept, solver="svd")
-                np.testing.assert_allclose(
-                    estimator.coef_, oracle.fit(X[~away], y[~away]).coef_, rtol=1e-7
-                )
-        assert error(np.log10([[C]]))[0] == pytest.approx(np.mean(squares), rel=1e-9)
 
 
 def test_held_out_optimum_is_inside_and_predicts_better_where_data_are_few() -> None:
