@@ -14,6 +14,17 @@ DAY = 86400.0  # s
 _TIME_OF_DAY = re.compile(r"\d\d?:\d\d(:\d\d([.,]\d+)?)?")
 
 
+#: Sizes from which on numbers count from 1970, in which unit: s of the year 1973, and
+#: the same moment in the others.
+_SINCE_1970 = {1e17: "unix ns", 1e14: "unix us", 1e11: "unix ms", 1e8: "unix"}
+
+
+def unit_since_1970(number: float) -> str | None:
+    """Unit in which a number of that size counts from 1970; None for a small one."""
+    fitting = (unit for size, unit in _SINCE_1970.items() if number >= size)
+    return next(fitting, None)
+
+
 class Clock(NamedTuple):
     """Times of a log's rows, read from texts."""
 

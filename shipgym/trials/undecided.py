@@ -1,7 +1,6 @@
 """Values of a ship file that are left to decide: ``rudder_positive = "decide"``."""
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +18,9 @@ def take_undecided(data: dict[str, Any], path: Path) -> tuple[str, ...]:
 
     A message names the line of the file and, from its comment, the choices.
     """
-    keys = set()
+    keys: set[str] = set()
     for section in _SECTIONS:
-        for table in _tables(data.get(section)):
-            keys |= _take(table)
+        keys |= _take(data.get(section))
     if not keys:
         return ()
 
@@ -45,21 +43,14 @@ def take_undecided(data: dict[str, Any], path: Path) -> tuple[str, ...]:
     return tuple(messages)
 
 
-def _take(table: dict[str, Any]) -> set[str]:
-    """Take values "decide" out of a table; their keys."""
+def _take(value: Any) -> set[str]:
+    """Take values "decide" out of a table, or each of several; their keys."""
     keys = set()
-    for key, value in [*table.items()]:
-        if value == _DECIDE:
-            keys.add(key)
-            del table[key]
+    if isinstance(value, list):
+        for table in value:
+            keys |= _take(table)
+    elif isinstance(value, dict):
+        keys = {key for key, one in value.items() if one == _DECIDE}
+        for key in keys:
+            del value[key]
     return keys
-
-
-def _tables(section: Any) -> Iterator[dict[str, Any]]:
-    """A table, or each of several."""
-    tables = [section]
-    if isinstance(section, list):
-        tables = section
-    for table in tables:
-        if isinstance(table, dict):
-            yield table

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipgym.arrays import Floats
+from shipgym.trials.clock_texts import unit_since_1970
 from shipgym.trials.units import QUANTITIES, UNITS, si_unit, unit_of_channel
 
 #: Size from which on a channel or quantity is not in SI units, and the unit that it has
@@ -16,14 +17,6 @@ _BY_SIZE = {
     "angle": (6.3, "deg"),
     "angular rate": (0.2, "deg/min"),
     "shaft speed": (10.0, "rpm"),
-}
-#: Sizes from which on times count from 1970, in which unit: s of the year 1973, and the
-#: same moment in the others.
-_SINCE_1970 = {
-    1e8: "unix",
-    1e11: "unix ms",
-    1e14: "unix us",
-    1e17: "unix ns",
 }
 #: Days from 1954 to 2119 in spreadsheets, from 1916 in MATLAB.
 _DAYS = {"excel days": (20_000.0, 80_000.0), "matlab days": (7e5, 8e5)}
@@ -73,9 +66,8 @@ def unit_by_size(values: Floats | None, channel: str) -> UnitGuess:
         return _time_by_size(values)
     known = values[np.isfinite(values)]
     largest = np.abs(known).max(initial=0.0)
-    limit, other = _BY_SIZE.get(QUANTITIES[channel], (np.inf, ""))
-    if channel in _BY_SIZE:
-        limit, other = _BY_SIZE[channel]
+    of_quantity = _BY_SIZE.get(QUANTITIES[channel], (np.inf, ""))
+    limit, other = _BY_SIZE.get(channel, of_quantity)
     if largest > limit:
         unit = other
     return UnitGuess(unit, f"from its size, up to {largest:.4g}")
@@ -88,13 +80,10 @@ def _time_by_size(values: Floats) -> UnitGuess:
     steps = np.diff(known)
     forward = steps[steps > 0.0]
     step = float(np.median(forward)) if forward.size else 1.0
-    unit = "s"
-    for size, since_1970 in _SINCE_1970.items():
-        seconds = step * UNITS["time"][since_1970]
-        if known.size and known.min() > size and seconds < 3600.0:
-            unit = since_1970
-    if unit != "s":
-        return UnitGuess(unit, f"from its size, up to {largest:.4g}")
+    by_size = f"from its size, up to {largest:.4g}"
+    since_1970 = unit_since_1970(float(known.min())) if known.size else None
+    if since_1970 and step * UNITS["time"][since_1970] < 3600.0:
+        return UnitGuess(since_1970, by_size)
 
     in_days = 2e-3  # three minutes, and far less than a row in seconds
     by_step = f"from its rows, which are {step:.3g} apart"
@@ -109,4 +98,4 @@ def _time_by_size(values: Floats) -> UnitGuess:
         in_seconds = step * UNITS["time"][finer]
         if step > 20.0 and 0.005 <= in_seconds <= 20.0:
             return UnitGuess(finer, by_step)
-    return UnitGuess(unit, f"from its size, up to {largest:.4g}")
+    return UnitGuess("s", by_size)

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.trials.clock_texts import read_clock
+from shipgym.trials.clock_texts import read_clock, unit_since_1970
+from shipgym.trials.units import UNITS
 
 _TAG = re.compile(r"[\\,]c:(\d{9,14}(?:\.\d+)?)")
 _CLOCK = re.compile(
@@ -64,19 +65,12 @@ def read_stamps(texts: Sequence[str]) -> Floats:
     rows = np.flatnonzero(is_clock == mostly_clocks)
     chosen = [texts[row] for row in rows.tolist()]
     if not mostly_clocks:
-        seconds[rows] = _seconds(np.array(chosen, dtype=np.float64))
+        numbers = np.array(chosen, dtype=np.float64)
+        unit = unit_since_1970(float(np.median(numbers)))
+        seconds[rows] = numbers * UNITS["time"][unit or "s"]
         return seconds
     try:
         seconds[rows] = read_clock(chosen).seconds
     except ValueError:  # such as 25:00:00
         return seconds
     return seconds
-
-
-def _seconds(numbers: Floats) -> Floats:
-    fractions = {1e17: 1e-9, 1e14: 1e-6, 1e11: 1e-3}
-    size = np.median(numbers)
-    for smallest, seconds in fractions.items():
-        if size >= smallest:
-            return numbers * seconds
-    return numbers
