@@ -5,11 +5,9 @@ from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Any
 
-import numpy as np
-
 from identification.samples.velocities import SIGNIFICANT
 from shipgym.manoeuvres.quantiles import NORMAL_95
-from shipgym.trials.units import KNOT
+from shipgym.trials.navigation import set_and_drift
 
 
 def findings(provenance: Mapping[str, Any]) -> list[str]:
@@ -148,12 +146,3 @@ def _current_interval(row: Mapping[str, Any]) -> list[str]:
         f"east {east:.3f} ± {east_margin:.3f} m/s (95 %)",
         f"which {verb} from zero",
     ]
-
-
-def set_and_drift(north: float, east: float) -> str:
-    """Speed of a current, m/s and knots, and where it sets."""
-    speed = np.hypot(north, east)
-    knots = speed / KNOT
-    bearing = np.arctan2(east, north)
-    towards = np.degrees(bearing) % 360.0
-    return f"{speed:.2f} m/s ({knots:.2f} knots) towards {towards:03.0f} deg"

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from identification.judging.fit import Fit
-from identification.judging.sentences import set_and_drift
 from shipgym import Trial
 from shipgym.plots import (
     CHANNEL_AXES,
@@ -20,7 +19,7 @@ from shipgym.plots import (
     panels,
 )
 from shipgym.plots.style import Figure
-from shipgym.trials.navigation import rotate_to_body
+from shipgym.trials.navigation import rotate_to_body, set_and_drift
 
 RUDDER = "#9aa5b1"
 

@@ -1,8 +1,5 @@
 """Conversion of a log's frame and origin to body-frame velocities at midship."""
 
-import math
-from typing import NamedTuple
-
 import numpy as np
 
 from shipgym.arrays import Floats
@@ -10,9 +7,8 @@ from shipgym.errors import InputError
 from shipgym.trials.conventions import AS_LOGGED, Conventions, Installation
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.instrument_offsets import DISTINCT_COURSES, correct_offsets
-from shipgym.trials.navigation import rotate_to_body
+from shipgym.trials.navigation import rotate_to_body, set_and_drift
 from shipgym.trials.resampling import Log
-from shipgym.trials.units import KNOT
 
 
 def to_project_conventions(log: Log, conventions: Conventions) -> None:
@@ -195,63 +191,28 @@ def _velocity(log: Log, installation: Installation) -> tuple[Floats, Floats] | N
 
 
 def _sway_through_water(log: Log, water: Floats, u: Floats, v: Floats) -> Floats:
-    """Sway over ground less the current that a speed log shows; adds a note of it."""
-    psi = log.channels["psi"]
-    current = set_and_drift(psi, water, u, v)
-    log.notes.append(current.note)
-    _, across = rotate_to_body(
-        current.north,
-        current.east,
-        psi,
-    )
-    return np.asarray(v - across)
+    """Sway over ground less the current that a speed log shows; adds a note of it.
 
-
-class SetAndDrift(NamedTuple):
-    """A current, m/s, by a speed log against the velocity over ground."""
-
-    north: float
-    east: float
-    unexplained: float  # standard deviation of what it does not explain
-
-    @property
-    def note(self) -> str:
-        """The current in words."""
-        speed = math.hypot(self.north, self.east)
-        knots = speed / KNOT
-        direction = math.atan2(self.east, self.north)
-        toward = math.degrees(direction) % 360.0
-        return (
-            f"set and drift by the speed log against the ground: {speed:.2f} m/s"
-            f" ({knots:.2f} kn) toward {toward:03.0f} deg, {self.unexplained:.2f} m/s"
-            " unexplained; removed from the sway"
-        )
-
-
-def set_and_drift(
-    psi: Floats, water: Floats, surge: Floats, sway: Floats
-) -> SetAndDrift:
-    """Current, m/s, from speed through the water and velocity over ground.
-
-    It explains best the difference of both along the ship; on nearly one course the
-    part across is taken from the mean sway, as if there were no leeway.
+    The current explains best the difference of both speeds along the ship; on nearly
+    one course the part across is taken from the mean sway, as if there were no leeway.
     """
-    # along the ship, and on one course across her too
+    psi = log.channels["psi"]
     c = np.cos(psi)
     s = np.sin(psi)
     rows = np.column_stack([c, s])
-    values = surge - water
+    values = u - water
     if np.ptp(psi) < DISTINCT_COURSES:
         across = np.column_stack([-s, c])
         rows = np.vstack([rows, across])
-        values = np.concatenate([values, sway])
+        values = np.concatenate([values, v])
 
     current, *_ = np.linalg.lstsq(rows, values, rcond=None)
     north, east = current.tolist()
-    explained = rows @ current
-    left = values - explained
-    return SetAndDrift(
-        north=north,
-        east=east,
-        unexplained=float(np.std(left)),
+    unexplained = np.std(values - rows @ current)
+    log.notes.append(
+        "set and drift by the speed log against the ground:"
+        f" {set_and_drift(north, east)}, {unexplained:.2f} m/s unexplained; removed"
+        " from the sway"
     )
+    _, sway = rotate_to_body(north, east, psi)
+    return np.asarray(v - sway)

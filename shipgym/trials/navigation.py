@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.trials.units import DEGREE
+from shipgym.trials.units import DEGREE, KNOT
 
 _EQUATOR = 6378137.0  # semi-major axis of WGS 84, m
 _ECCENTRICITY_2 = 6.69437999014e-3  # its first eccentricity, squared
@@ -44,3 +44,12 @@ def rotate_to_body(north: Any, east: Any, psi: Any) -> tuple[Any, Any]:
     """
     c, s = np.cos(psi), np.sin(psi)
     return north * c + east * s, east * c - north * s
+
+
+def set_and_drift(north: float, east: float) -> str:
+    """Speed of a current, given in m/s, in m/s and knots, and where it sets."""
+    speed = math.hypot(north, east)
+    knots = speed / KNOT
+    bearing = math.atan2(east, north)
+    towards = math.degrees(bearing) % 360.0
+    return f"{speed:.2f} m/s ({knots:.2f} knots) towards {towards:03.0f} deg"

@@ -183,7 +183,7 @@ def test_a_current_is_what_speed_over_ground_has_more_than_the_log(
     path = written(tmp_path / "run.csv", t=T, psi=psi, stw=stw, **ground)
     trial = Trial.from_csv(path)
     np.testing.assert_allclose(trial["v"], 0.0, atol=1e-9)
-    assert "0.54 m/s (1.05 kn) toward 338 deg, 0.00 m/s" in " ".join(trial.notes)
+    assert "0.54 m/s (1.05 knots) towards 338 deg, 0.00 m/s" in " ".join(trial.notes)
 
 
 def test_a_track_over_the_date_line_has_no_jump(tmp_path):
