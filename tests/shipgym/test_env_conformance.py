@@ -1,7 +1,6 @@
 """What Gymnasium, stable-baselines3 and workers ask of an environment; wrong arguments
 and actions."""
 
-import math
 import warnings
 
 import gymnasium
@@ -162,9 +161,7 @@ def test_a_step_before_the_reset_or_after_the_end_is_refused(name):
     ("options", "message"),
     [
         ({"sae": "calm"}, "unknown key 'sae'. Did you mean 'sea'"),
-        ({"course_change": 10.0}, "Did you mean 'course_change_deg'"),
         ({"sea": 3}, "sea: expected .* got 3"),
-        ({"sea": []}, "sea: expected at least one"),
         (
             {"sea": ["calm", "rugh"]},
             "sea: expected .* got 'rugh'.*Did you mean 'rough'",
@@ -174,11 +171,8 @@ def test_a_step_before_the_reset_or_after_the_end_is_refused(name):
             {"action": "rudder-shaft"},
             "action: .*'mariner', got 'rudder-shaft'",
         ),
-        ({"measurement": "filterd"}, "Did you mean 'filtered'"),
         ({"noise": -0.1}, "noise: expected"),
-        ({"noise": math.nan}, "noise: expected"),
         ({"roll": True}, "roll: .*'mariner', which does not roll"),
-        ({"roll_weight": -1.0}, "roll_weight: expected"),
         (
             {"envelope_weight": "much"},
             "envelope_weight: expected a number >= 0, got 'much'",
@@ -191,9 +185,6 @@ def test_a_step_before_the_reset_or_after_the_end_is_refused(name):
             {"model": "tanker", "water_depth": 18.0},
             "water_depth: expected more than the draught",
         ),
-        ({"dt": 1e6}, r"dt: expected a number <= 104"),
-        ({"dt": math.nan}, "dt: expected"),
-        ({"episode_steps": 2.5}, "episode_steps: expected an integer"),
         ({"change_interval_steps": 0}, "change_interval_steps: expected"),
         ({"max_envelope_distance": 0.5}, "max_envelope_distance: expected"),
         ({"course_change_deg": 120.0}, "course_change_deg: expected"),
@@ -205,10 +196,6 @@ def test_a_step_before_the_reset_or_after_the_end_is_refused(name):
             {"course_changes_deg": []},
             "course_changes_deg: expected one number at least",
         ),
-        (
-            {"course_changes_deg": [0.0, math.inf]},
-            "course_changes_deg: number 1: expected",
-        ),
         ({"model": None}, "model: expected a name, .* got None"),
         ({"model": "marinr"}, "Did you mean 'mariner'"),
         ({"model_uncertainty": "prior"}, "model_uncertainty: expected"),
@@ -219,7 +206,6 @@ def test_a_step_before_the_reset_or_after_the_end_is_refused(name):
             "ensemble: expected models of one structure, got 'tanker'",
         ),
         ({"speed_range": (0.9, 0.5)}, "speed_range: the largest: expected"),
-        ({"speed_range": (0.0, 0.5)}, "speed_range: the least: expected"),
         (
             {"model": "kvlcc2", "loading_range": (0.8, 1.0)},
             "loading_range: expected .* coefficients, got 'kvlcc2",

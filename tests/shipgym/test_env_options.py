@@ -337,13 +337,8 @@ def test_observations_have_the_bounds_of_their_page(name, page, count):
 @pytest.mark.parametrize(
     ("travel_s", "interval"),
     [
-        (20.0, 1.0),
         (28.2, 1.0),
         (28.4, 2.0),
-        (63.0, 2.0),
-        (63.5, 5.0),
-        (141.0, 5.0),
-        (142.0, 10.0),
         (400.0, 20.0),
         (3.0, 0.2),
         (0.5, 0.02),

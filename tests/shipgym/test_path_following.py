@@ -1,7 +1,6 @@
 """The path-following environment: its planned path, its reward and attempts at gaming
 it."""
 
-from dataclasses import replace
 from itertools import pairwise
 
 import gymnasium
@@ -13,7 +12,6 @@ from hypothesis import strategies as st
 import shipgym
 from shipgym import InputError
 from shipgym.engine.motion import Motion, Ship
-from shipgym.engine.records import leaves
 from shipgym.envs.engine import Engine
 from shipgym.sea import Current, Waves, Weather, Wind
 from shipgym.tasks import path_following
@@ -257,66 +255,6 @@ def test_each_episode_has_one_of_a_list_of_paths():
         [20, 20], abs=8
     )
     assert sum(ends.count(path[-1].tolist()) for path in (LINE, HOOK)) == 40
-
-
-def test_the_mirrored_voyage_earns_the_same():
-    """A ship without a preferred side, on the path that is reflected in the
-    north axis."""
-    mariner = shipgym.load_model("mariner")
-    even = {
-        name: value for name, value in mariner.coefficients.items() if name[1:3] == "_0"
-    }
-    symmetric = replace(
-        mariner, coefficients={**mariner.coefficients, **dict.fromkeys(even, 0.0)}
-    )
-    task = Task.of("PathFollowing", waypoints=HOOK)
-    engine = Engine(symmetric, 1, task)
-    mirror = Engine(symmetric, 1, task.changed(waypoints=HOOK * [1.0, -1.0]))
-    mirrored = {
-        "y",
-        "psi",
-        "v",
-        "r",
-        "delta",
-        "heading_setpoint",
-        "integral",
-        "heading_error",
-        "cross_track",
-        "leg.east",
-        "leg.sine",
-        "leg.course",
-        "leg.turn",
-        "leg.second_turn",
-        "rudder_activity.direction",
-        "rudder_activity.furthest",
-    }
-    for one in (engine, mirror):
-        one.reset([4])
-    for name in (*Motion._fields[:6], "delta", *leaves(task.definition.State)):
-        mirror.write(name, (-1.0 if name in mirrored else 1.0) * engine.read(name))
-    odd = {
-        "heading_error_sin",
-        "yaw_rate",
-        "sway",
-        "rudder",
-        "last_command",
-        "heading_error_integral",
-        "cross_track",
-        "course_error_sin",
-        "next_turn_angle",
-        "second_turn_angle",
-    }
-    signs = np.array(
-        [-1.0 if quantity.name in odd else 1.0 for quantity in task.observed(symmetric)]
-    )
-    random, seen = np.random.default_rng(0), engine.observations
-    for _ in range(500):
-        order = pd(seen[0]) + 0.3 * random.normal()
-        seen, rewards, *_ = engine.step([[order]])
-        reflected, earned, *_ = mirror.step([[-order]])
-        assert rewards[0] == pytest.approx(earned[0], rel=1e-6, abs=1e-9)
-        np.testing.assert_allclose(seen[0], signs * reflected[0], atol=1e-5)
-    assert engine.read("leg.number")[0] == 2.0
 
 
 def cutter(seen, step, env):

@@ -193,31 +193,11 @@ WRONG = [
         "fairway.py: expected a NamedTuple 'State' .* got no 'State'",
     ),
     (
-        "def observe",
-        "def obsrve",
-        r"expected a function observe\(readings, state.* got no 'observe'",
-    ),
-    (
         "def begin(ship, settings,",
         "def begin(ship,",
         "begin: expected a function begin.* got one of 3 arguments",
     ),
-    (
-        "g_sin: Annotated[float, ObservationSpec(-1.0, 1.0)]",
-        "g_sin: float",
-        "Observation.heading_sin: expected Annotated.* got no bounds",
-    ),
     ('"speeding", ', '"speding", ', "REPORTED: expected a tuple .* got 'speding'"),
-    (
-        "] = 0.7",
-        "]",
-        "[Nn]on-default namedtuple field|expected a default, got none",
-    ),
-    (
-        "    speeding: Flag",
-        "    speeding: str",
-        "State.speeding: expected a float, got",
-    ),
     (
         "    delay: float",
         "    end: float",
@@ -235,11 +215,6 @@ WRONG = [
     ),
     ("drawn(random, 1,", "drwn(random, 1,", "in begin.*drwn"),
     (
-        "return 2.0 + settings",
-        "return settings.weight + settings",
-        "in worst_cost.*weight",
-    ),
-    (
         "return 2.0 + settings.over_speed_weight",
         "pass",
         "in worst_cost: .*expected a number, got nothing",
@@ -249,16 +224,6 @@ WRONG = [
         "return -2.0 - ",
         "fairway.py: worst_cost: expected a number >= 0, got -52",
     ),
-    (
-        "] = 50.0",
-        "] = [50.0]",
-        r"Settings.over_speed_weight: expected a number, or .* got \[50.0\]",
-    ),
-    (
-        '5.0, "rad/s"',
-        "5.0, 3",
-        "Observation.yaw_rate: unit: expected a non-empty string, got 3",
-    ),
     ("max(motion.u", "mox(motion.u", "line DEF, in step: NameError: name 'mox'"),
     ("Reward(-off * off, ", "Reward(", "line HERE, in step: TypeError: .*'over_speed'"),
     (
@@ -267,45 +232,19 @@ WRONG = [
         r"in step: result 2: expected Reward, got \(a number, a number, a number\)",
     ),
     (
-        "after, reward",
-        "after, after",
-        "line DEF, in step: result 2: expected Reward, got State",
-    ),
-    (
         "    return Observation(",
         "    return [sine]\n    (",
         "line DEF, in observe: returned value: expected Observation, got list",
-    ),
-    (
-        "delay = 1.0",
-        "state.limit = delay = 1.0",
-        "line HERE, in step: AttributeError: can't set attribute",
     ),
     (
         "fabs(off) > 1.0, ",
         "",
         r"line DEF, in step: returned value: .* got \(State, Reward, a boolean\)",
     ),
-    ("fabs(off) > 1.0", "off", "in step: result 3: expected a boolean, got a number"),
-    (
-        "motion.y, limit",
-        "motion.y, (limit, 1.0)",
-        r"State.limit: expected a number, got \(a number, a number\)",
-    ),
-    (
-        "return motion, State",
-        "return State",
-        "in begin: returned value: expected .Motion, State., got State",
-    ),
     (
         "def begin",
         "def plan_length(_):\n    return -1\n\n\ndef begin",
         "plan_length: expected an integer of at least 0, got -1",
-    ),
-    (
-        "def begin",
-        "def plan_length(s):\n    return s.w\n\n\ndef begin",
-        "line NEXT, in plan_length: Attr",
     ),
     (
         "def begin",
@@ -318,11 +257,6 @@ WRONG = [
         "line HERE, in begin: IndexError: index 40",
     ),
     (
-        "def worst_cost(settings)",
-        "def worst_cost(*settings)",
-        "expected a function worst_cost.* variable arguments",
-    ),
-    (
         "def step",
         "import numba\n\n\n@numba.njit\ndef step",
         "step: expected a function step.* got no plain function",
@@ -331,21 +265,6 @@ WRONG = [
         "return 2.0 + ",
         "return worst_cost(settings) + ",
         "line DEF, in worst_cost: expected a function that can be compiled, got",
-    ),
-    (
-        "] = 50.0",
-        "] = -50.0",
-        "Settings.over_speed_weight: default: expected a number >= 0, got -50",
-    ),
-    (
-        "REPORTED = (",
-        "REPORTED = 3 or (",
-        "REPORTED: expected a tuple of fields .* got 3",
-    ),
-    (
-        "REPORTED = (",
-        'NAME = ["a"]\nREPORTED = (',
-        r"NAME: expected a non-empty string, got \['a'\]",
     ),
     (
         "REPORTED = (",
@@ -559,11 +478,8 @@ def test_bounds_of_an_observation_are_finite_and_in_order(tmp_path):
     for bounds, wrong in {
         "1.0, 1.0": "upper bound: expected a number > 1, got 1",
         "-float('inf'), 1.0": "lower bound: expected a number, got -inf",
-        "-1.0, float('nan')": "upper bound: expected a number > -1, got nan",
-        "'0', 1.0": "lower bound: expected a number, got '0'",
         "-1.0, 1.0, option='rol'": "option: expected one of '', 'roll', 'shaft'",
         "-1.0, 1.0, scale=-2.0": "scale: expected a number > 0, got -2",
-        "-1.0, 1.0, scale='8'": "scale: expected a number > 0, got '8'",
         "-1.0, 1.0, scale=lambda ship: 1.0": (
             "scale: expected a function of ship and settings, got one of 1 arguments"
         ),
