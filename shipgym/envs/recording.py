@@ -1,8 +1,7 @@
 """Episodes of an environment written to files, for replay and identification."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from glob import escape
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, SupportsFloat, TypeVar
 
@@ -10,7 +9,7 @@ import gymnasium
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_text, unexpected
+from shipgym.checks import unexpected
 from shipgym.envs.episode import Episode
 from shipgym.errors import InputError
 from shipgym.files import make_folder
@@ -40,13 +39,6 @@ class RecordEpisode(
         A single environment of shipgym, in other wrappers or not.
     folder : str or Path
         Where the files go; made if it does not exist.
-    episode_trigger : callable of int, optional
-        Whether to record an episode, given its number, counted from 0. All by default.
-    trials : bool
-        Whether each episode is written as a trial too, `episode-00000.csv`, if it has
-        two steps.
-    name_prefix : str
-        Prefix of the names of the files.
     overwrite : bool
         Whether files of an earlier recording may be replaced.
     """
@@ -55,27 +47,18 @@ class RecordEpisode(
         self,
         env: gymnasium.Env[Observation, Action],
         folder: str | Path,
-        episode_trigger: Callable[[int], bool] | None = None,
         *,
-        trials: bool = False,
-        name_prefix: str = "episode",
         overwrite: bool = False,
     ) -> None:
         gymnasium.utils.RecordConstructorArgs.__init__(
             self,
             folder=str(folder),
-            episode_trigger=episode_trigger,
-            trials=trials,
-            name_prefix=name_prefix,
             overwrite=overwrite,
         )
         _check_environment(env)
         super().__init__(env)
         self.episode_number = -1
-        self._trigger = episode_trigger
-        self._trials = trials
-        self._prefix = name_prefix
-        self._folder = _folder(Path(folder), name_prefix, overwrite)
+        self._folder = _folder(Path(folder), overwrite)
         self._since_seed = -1
         self._recorded: _Recorded | None = None
 
@@ -93,8 +76,7 @@ class RecordEpisode(
             self._since_seed += 1
         else:
             self._since_seed = 0
-        if self._trigger is None or self._trigger(self.episode_number):
-            self._recorded = _Recorded(self.env, self._since_seed, info)
+        self._recorded = _Recorded(self.env, self._since_seed, info)
         return observation, info
 
     def step(
@@ -118,13 +100,8 @@ class RecordEpisode(
         self._recorded = None
         if recorded is None or not recorded.rewards:
             return
-        episode = recorded.episode()
-        name = f"{self._prefix}-{self.episode_number:05d}"
-        file = self._folder / name
-        episode.save(file.with_name(f"{name}.json"))
-        if self._trials and episode.n_steps > 1:
-            trial = episode.to_trial(name)
-            trial.to_csv(file.with_name(f"{name}.csv"))
+        name = f"episode-{self.episode_number:05d}.json"
+        recorded.episode().save(self._folder / name)
 
 
 class _Recorded:
@@ -225,14 +202,10 @@ def _check_environment(env: Any) -> None:
             )
 
 
-def _folder(folder: Path, prefix: str, overwrite: bool) -> Path:
+def _folder(folder: Path, overwrite: bool) -> Path:
     """Make the folder of recordings; InputError where it holds earlier ones."""
-    name = Path(check_text(prefix, "name_prefix")).name
-    if name != prefix:
-        raise unexpected("name_prefix", "the beginning of a file's name", prefix)
     make_folder(folder)
-    pattern = f"{escape(prefix)}-[0-9]*.json"
-    earlier = sorted(folder.glob(pattern))
+    earlier = sorted(folder.glob("episode-[0-9]*.json"))
     if earlier and not overwrite:
         raise InputError(
             f"folder: {folder} holds '{earlier[0].name}' of an earlier recording;"

@@ -107,29 +107,14 @@ def test_rewards_parts_and_orders_are_those_of_the_environment(tmp_path):
     assert episode.waypoints is None
 
 
-def test_only_the_episodes_that_the_trigger_picks_are_written(tmp_path):
-    env = RecordEpisode(
-        course_keeping(), tmp_path, lambda number: number % 2 == 1, trials=True
-    )
-    for _ in range(4):
-        sail(env)
-    assert files(tmp_path) == [
-        "episode-00001.csv",
-        "episode-00001.json",
-        "episode-00003.csv",
-        "episode-00003.json",
-    ]
-
-
 def test_an_episode_that_is_cut_off_is_written_and_says_so(tmp_path):
-    env = RecordEpisode(course_keeping(), tmp_path, trials=True)
+    env = RecordEpisode(course_keeping(), tmp_path)
     sail(env, steps=1)
     sail(env, steps=3)
     env.reset()
     env.close()
     assert files(tmp_path) == [
         "episode-00000.json",
-        "episode-00001.csv",
         "episode-00001.json",
     ]
     episode = Episode.load(tmp_path / "episode-00001.json")
@@ -178,8 +163,7 @@ def test_recordings_are_not_mixed_with_earlier_ones(tmp_path):
     ):
         RecordEpisode(course_keeping(), tmp_path)
     sail(RecordEpisode(course_keeping(), tmp_path, overwrite=True))
-    sail(RecordEpisode(course_keeping(), tmp_path, name_prefix="lq"))
-    assert files(tmp_path) == ["episode-00000.json", "lq-00000.json"]
+    assert files(tmp_path) == ["episode-00000.json"]
 
 
 def test_what_cannot_be_recorded_is_refused_at_once(tmp_path):
@@ -192,18 +176,16 @@ def test_what_cannot_be_recorded_is_refused_at_once(tmp_path):
     with pytest.raises(InputError, match="expected a single environment"):
         RecordEpisode(several, tmp_path)
     several.close()
-    with pytest.raises(InputError, match="expected the beginning of a file's name"):
-        RecordEpisode(course_keeping(), tmp_path, name_prefix="a/b")
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="no folder can be made there"):
         RecordEpisode(course_keeping(), tmp_path / "file")
 
 
 def test_an_environment_that_records_is_made_again_from_its_spec(tmp_path):
-    env = RecordEpisode(course_keeping(), tmp_path, name_prefix="again")
+    env = RecordEpisode(course_keeping(), tmp_path)
     spec = gymnasium.envs.registration.EnvSpec.from_json(env.spec.to_json())
     sail(gymnasium.make(spec))
-    assert files(tmp_path) == ["again-00000.json"]
+    assert files(tmp_path) == ["episode-00000.json"]
 
 
 @pytest.mark.filterwarnings("ignore:.*different from the unwrapped version")
