@@ -1,8 +1,8 @@
 """Fields of a `LearnedPolicy` from a trained agent of stable-baselines3.
 
 PPO and A2C have the mean of their action, SAC and TQC the hyperbolic tangent of it, TD3
-and DDPG a network that ends so. Whatever else is found (other extractors of features,
-layers or wrappers) is refused, not guessed.
+and DDPG a network that ends so. An agent that commands otherwise than these layers, as
+one with an extractor of features does, is refused.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +18,6 @@ from agents.controllers.interface import model_hash
 from agents.policies.network import Layer, Network
 from agents.policies.weights_file import as_json
 from shipgym import InputError
-from shipgym.checks import quoted
 from shipgym.envs.registration import env_id
 from shipgym.tasks.definition import TASKS
 
@@ -36,8 +35,6 @@ class Actor(NamedTuple):
         """Weight by which a policy of this kind is known."""
         return f"{self.head or self.body + '.0'}.weight"
 
-
-DENSE = "dense layers with ReLU or Tanh between them"
 
 #: Wrappers that change observations.
 REFUSED = ("VecFrameStack", "VecTransposeImage", "VecExtractDictObs")
@@ -174,19 +171,6 @@ def task_showing(names: Sequence[str]) -> str:
 def _network(agent: Any) -> Network:
     """Layers from observation to command."""
     policy = agent.policy
-    actor = getattr(policy, "actor", None) or policy
-    extractor = type(getattr(actor, "features_extractor", None)).__name__
-    if extractor not in ("FlattenExtractor", "NoneType"):
-        raise InputError(
-            "agent: expected 'MlpPolicy' without a features extractor, got one with"
-            f" {extractor}"
-        )
-    if getattr(agent, "use_sde", False):  # commands by other layers
-        raise InputError(
-            "agent: expected an agent without state-dependent exploration, got one"
-            " with it (use_sde)"
-        )
-
     weights = policy.state_dict()
     actors = (
         Actor("mlp_extractor.policy_net", "action_net", "linear", "Tanh"),  # PPO, A2C
@@ -204,32 +188,16 @@ def _network(agent: Any) -> Network:
     between = getattr(activation, "__name__", actor.activation)
     activation_of = {"ReLU": "relu", "Tanh": "tanh"}
     if between not in activation_of:
-        raise InputError(f"agent: expected {DENSE}, got {between} as layer 1")
+        raise InputError(
+            f"agent: expected ReLU or Tanh between its layers, got {between}"
+        )
     layers = _dense_layers(actor, weights)
     return Network(layers, activation_of[between], actor.output)
 
 
 def _dense_layers(actor: Actor, weights: Mapping[str, Any]) -> tuple[Layer, ...]:
-    """Layers from observation to command; InputError if others act as well."""
+    """Layers from observation to command."""
     names = _names_of_layers(actor, weights)
-    not_acting = (
-        "mlp_extractor.value_net.",
-        "value_net.",
-        "log_std",
-        "actor.log_std.",
-        "actor_target.",
-        "critic",
-    )
-    acting = {name for name in weights if not name.startswith(not_acting)}
-    used = set()
-    for name in names:
-        used |= {f"{name}.weight", f"{name}.bias"}
-    if used != acting:
-        raise InputError(
-            f"agent: expected {DENSE}, got weights missing or unknown:"
-            f" {quoted(sorted(used ^ acting))}"
-        )
-
     layers = []
     for name in names:
         weight = _array(weights[f"{name}.weight"])
@@ -272,7 +240,7 @@ def _check_extraction(network: Network, agent: Any, action: str) -> None:
     inputs = uniform.astype(np.float32)
     commands, _ = agent.predict(inputs, deterministic=True)
     output = network(inputs)
-    agreement = 1e-4  # of the commands found with torch and without, far above rounding
+    agreement = 1e-5  # of the commands found with torch and without, above rounding
     if action == "rudder-discrete":
         agrees = np.array_equal(output.argmax(axis=-1), commands)
     else:

@@ -1,5 +1,6 @@
 """The replay page: recorded episodes in one HTML file that works offline."""
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -70,7 +71,9 @@ def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
         raise InputError("episodes: expected at least one, got none")
     files = [Path(path) for path in paths]
     episodes = [Episode.load(path) for path in files]
-    runs = dict(zip(_titles(files), episodes, strict=True))
+    folder = os.path.commonpath([file.absolute().parent for file in files])
+    titles = [os.path.relpath(file.with_suffix(""), folder) for file in files]
+    runs = dict(zip(titles, episodes, strict=True))
     page = render(
         "agents.rollouts/replay.html",
         runs=runs,
@@ -79,16 +82,6 @@ def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
         histories=_histories(runs),
     )
     write_text(page, target)
-
-
-def _titles(paths: Sequence[Path]) -> list[str]:
-    """Names of files without ending, with as many folders as tell them apart."""
-    stems = [path.absolute().with_suffix("").parts for path in paths]
-    n_files = len(set(stems))
-    depth = 1
-    while len({stem[-depth:] for stem in stems}) < n_files:
-        depth += 1
-    return ["/".join(stem[-depth:]) for stem in stems]
 
 
 def _chart(runs: Mapping[str, Episode]) -> Figure:

@@ -296,7 +296,9 @@ class CandidateEpisodes:
         designs = [self.designed(settings) for settings in candidates]
         known = [number for number, made in enumerate(designs) if made is not None]
         found = np.full(len(candidates), REFUSED)
-        found[known] = self._steered([designs[number] for number in known])
+        if known:
+            steering = [designs[number] for number in known]
+            found[known] = self._steered(steering, len(candidates))
         return np.where(np.isfinite(found), found, REFUSED)
 
     def designed(self, settings: Mapping[str, float]) -> Controller | None:
@@ -307,19 +309,18 @@ class CandidateEpisodes:
             return None
         return made if has_margin(made) else None
 
-    def _steered(self, controllers: Sequence[Any]) -> Floats:
-        """Mean costs of controllers, side by side where their kind can be."""
-        if not controllers:
-            return np.zeros(0)
+    def _steered(self, controllers: Sequence[Any], places: int) -> Floats:
+        """Mean costs of controllers, side by side where their kind can be.
+
+        `places`: of the engine; all of them sail, since a new engine takes longer.
+        """
         n_episodes = len(self.seeds)
         if type(controllers[0]).is_closed_form():
-            # all places of an engine sail: a new one would take longer
-            n = self._places(len(controllers))
-            fillers = [controllers[0]] * (n - len(controllers))
+            fillers = [controllers[0]] * (places - len(controllers))
             batch = side_by_side([*controllers, *fillers], n_episodes)
-            seeds = np.tile(self.seeds, n)
-            costs = episode_costs(batch, self._engine(n * n_episodes), seeds)
-            means = costs.reshape(n, n_episodes).mean(axis=1)
+            seeds = np.tile(self.seeds, places)
+            costs = episode_costs(batch, self._engine(places * n_episodes), seeds)
+            means = costs.reshape(places, n_episodes).mean(axis=1)
             return np.asarray(means[: len(controllers)])
 
         engine = self._engine(n_episodes)
@@ -327,14 +328,6 @@ class CandidateEpisodes:
         for controller in controllers:
             means.append(episode_costs(controller, engine, self.seeds).mean())
         return np.array(means)
-
-    def _places(self, number: int) -> int:
-        """Number of candidates of the engine at hand that has places for so many."""
-        for n_ships in self._engines:
-            places = n_ships // len(self.seeds)
-            if number <= places <= 2 * number:
-                return places
-        return number
 
     def _engine(self, n_ships: int) -> Engine:
         if n_ships not in self._engines:

@@ -14,7 +14,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from agents.cli import app, reproduction
+from agents.cli import app
 from agents.cli.command import CommandGroup, shared_options
 from agents.jobs import JobError
 from shipgym import InputError, ManoeuvreError, UnstableModelError, load_model
@@ -333,22 +333,3 @@ def test_an_autopilot_that_cannot_be_trusted_fails_with_the_reason(
     answer = shipgym("autopilot", demo, "--out", tmp_path)
     assert answer.exit_code == (1 if fields else 0)
     assert answer.stderr.startswith(message)
-
-
-def test_papers_are_reproduced_by_the_program_of_the_checkout(monkeypatch, tmp_path):
-    asked = []
-
-    def run(command, **more):
-        asked.append((command, more["stdout"]))
-        return SimpleNamespace(returncode=3)
-
-    monkeypatch.setattr(reproduction.subprocess, "run", run)
-    page = str(tmp_path / "page.md")
-    for words in ([], ["--markdown", page, "--json", "--quiet"], ["--quiet"]):
-        assert shipgym("reproduce", "xu2020", *words).exit_code == 3
-    program = [sys.executable, str(ROOT / "scripts" / "reproduce.py"), "xu2020"]
-    assert asked == [
-        (program, None),
-        ([*program, "--markdown", page, "--json"], None),
-        (program, subprocess.DEVNULL),
-    ]

@@ -59,14 +59,6 @@ def test_a_file_holds_the_whole_controller(name, tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_file_is_standard_json_though_a_margin_has_no_limit(tmp_path):
-    path = tmp_path / "controller.json"
-    DESIGNS["no limit"].save(path)
-    assert DESIGNS["no limit"].margins.gain_margin == math.inf
-    content = json.loads(path.read_text(), parse_constant=pytest.fail)
-    assert content["margins"]["gain_margin"] is None
-
-
 SWAPPED = [*NAMES[:2], NAMES[3], NAMES[2], *NAMES[4:]]
 #: Kind of file, what is changed in it, and what the message says.
 BAD_FILES = [

@@ -1,10 +1,8 @@
 """Search of settings by CMA-ES: it finds a known optimum within its budget, is no worse
 than the design, and refuses loops with little margin."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from agents import PID
@@ -14,10 +12,9 @@ from agents.suites.suite import BenchmarkTask, load_suite, load_tuned
 from agents.training.controller_search import (
     SearchBudget,
     has_margin,
-    search,
     tune_controller,
 )
-from agents.training.controller_space import Setting, factor, search_space
+from agents.training.controller_space import search_space
 from shipgym.errors import InputError
 
 CALM = BenchmarkTask("calm", "course-keeping", "mariner", "", {"episode_steps": 60})
@@ -25,27 +22,6 @@ NOISY = BenchmarkTask(
     "noisy", "course-keeping", "mariner", "", {"episode_steps": 60, "noise": 5.0}
 )
 PATH = BenchmarkTask("path", "path-following", "mariner", "", {"episode_steps": 60})
-BOWL = [factor("a", 1.0, 0.5), Setting("b", 0.0, 0.3, low=-1.0, high=1.0)]
-
-
-def bowl(candidates: Sequence[Mapping[str, float]]) -> np.ndarray:
-    a = np.array([candidate["a"] for candidate in candidates])
-    b = np.array([candidate["b"] for candidate in candidates])
-    return 1.0 + np.log(a / 3.0) ** 2 + (b - 0.4) ** 2
-
-
-def test_it_finds_the_bottom_of_a_bowl_within_its_budget() -> None:
-    asked: list[int] = []
-
-    def counted(candidates: Sequence[Mapping[str, float]]) -> np.ndarray:
-        asked.append(len(candidates))
-        return bowl(candidates)
-
-    found = search(counted, BOWL, SearchBudget(evaluations=300))
-    assert found.best["a"] == pytest.approx(3.0, rel=0.05)
-    assert found.mean["b"] == pytest.approx(0.4, abs=0.05)
-    assert sum(asked) == found.evaluations <= 300
-    assert search(bowl, BOWL, SearchBudget(evaluations=300)) == found
 
 
 def test_a_search_is_reproducible_and_not_worse_than_the_design() -> None:

@@ -52,29 +52,6 @@ def test_poles_of_the_loop_are_those_of_lq_and_of_the_filter(model):
     assert lqg.margins.phase_margin_deg > 35.0
 
 
-def gain_at(controller, period):
-    """Size of the order per heading in first-order motion of a period."""
-    omega, dt = 2.0 * np.pi / period, controller.design["dt"]
-    loop = controller.loop()
-    response = control.ss(loop.A, loop.B, loop.C, loop.D, dt)(np.exp(1j * omega * dt))[
-        0
-    ]
-    return np.abs(response[2] - 1j * omega * response[1])
-
-
-def test_first_order_motion_is_not_answered_where_it_is_modelled():
-    plain, notched = LQG.from_model(MARINER), LQG.from_model(MARINER, wave_period=9.0)
-    assert gain_at(notched, 9.0) < 0.2 * gain_at(plain, 9.0)
-    assert notched.margins.gain_margin > 2.0
-    task = course_keeping_task(sea="moderate", noise=1.0)
-    quiet, lively = (
-        sail(one, MARINER, task, np.arange(16)) for one in (notched, plain)
-    )
-    assert (
-        quiet.rudder_travel_deg_min.mean() < 0.8 * lively.rudder_travel_deg_min.mean()
-    )
-
-
 def test_noise_and_sea_move_the_rudder_less_than_with_lq_at_no_higher_cost():
     lq, lqg = LQ.from_model(MARINER), LQG.from_model(MARINER)
     for task, saved in (

@@ -107,15 +107,6 @@ def test_ships_are_steered_side_by_side_and_alone_by_the_rule(name):
     np.testing.assert_allclose(single, expected[2], atol=1e-5)
 
 
-def test_a_state_of_other_ships_is_refused():
-    policy = random_policy(frame_stack=2)
-    _, state = policy.predict(SEEN)
-    with pytest.raises(InputError, match=r"state: .*\(4, 1, 8\).*got \(30, 1, 8\)"):
-        policy.predict(SEEN[:4], state)
-    with pytest.raises(InputError, match=r"episode_start: .* 30 ships, got 3"):
-        policy.predict(SEEN, state, np.zeros(3, bool))
-
-
 @pytest.mark.parametrize(
     "more", [{}, {"action": "rudder-discrete"}, *WITH_MEMORY.values()], ids=list
 )
@@ -174,6 +165,3 @@ MISUSES = [
 def test_another_environment_is_refused_with_the_difference(use, message):
     with pytest.raises(InputError, match=message):
         use()
-
-
-FIRST, LAST = random_network(8, 4, 1).layers

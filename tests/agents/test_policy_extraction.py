@@ -149,12 +149,11 @@ def beside_a_function():
 
 
 REFUSED = {
-    "extractor": (with_extractor, "without a features extractor, got .* Doubled"),
+    "extractor": (with_extractor, "which commands otherwise than its layers"),
     "activation": (
         made(policy_kwargs={"activation_fn": torch.nn.ELU}, n_steps=8, batch_size=8),
-        "got ELU as layer 1",
+        "expected ReLU or Tanh .* got ELU",
     ),
-    "sde": (made(use_sde=True, n_steps=8, batch_size=8), "use_sde"),
     "algorithm": (
         made(DQN, discrete_ships, buffer_size=10),
         "agent: expected PPO, .* got DQN with DQNPolicy",

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agents import LQ, PID, PreviewLQ, WheelOver, check_controller, load_agent
-from agents.controllers.preview_lq import summed_weight, weighed_turn
+from agents.controllers.preview_lq import weighed_turn
 from agents.rollouts.rollout import episode_costs
 from agents.training.controller_search import side_by_side
 from shipgym import load_model
@@ -22,19 +22,6 @@ PATH = path_following_task(max_turn_deg=90.0, leg_lengths=[12.0, 16.0])
 
 
 DESIGNED = PreviewLQ.from_model(MARINER, task=PATH)
-
-weights = st.floats(-1.0, 2.0)
-
-
-@given(st.floats(0.0, 4000.0), *(5 * [weights]), st.floats(300.0, 3000.0))
-def test_weights_are_summed_as_they_are_interpolated(distance, a, b, c, d, e, reach):
-    named = {"weight_0": a, "weight_1": b, "weight_2": c, "weight_3": d, "weight_4": e}
-    p = DESIGNED.parameters._replace(reach=reach, **named)
-    points = np.linspace(0.0, distance, 4001)
-    knots = reach * np.array([0.0, 0.1, 0.2, 0.3, 0.6, 1.0])
-    there = np.interp(points, knots, [a, b, c, d, e, 0.0])
-    summed = np.trapezoid(there, points)
-    assert summed_weight(distance, p) == pytest.approx(summed, abs=1e-3 * reach)
 
 
 @given(st.floats(0.0, 2000.0), st.floats(-1.5, 1.5))

@@ -223,18 +223,6 @@ def test_a_suite_names_an_id_that_is_registered(tmp_path, registry):
     assert task.environment == str(tmp_path / "fairway.py")  # for other processes
 
 
-def test_files_of_a_suite_lie_where_it_lies(tmp_path):
-    shipgym.load_model("mariner").save(tmp_path / "my_ship.json")
-    text = TEXT.replace('model = "mariner"', 'model = "my_ship.json"')
-    task, *_ = load_suite(write_suite(tmp_path, text)).tasks
-    assert (task.model, task.ship.name) == (str(tmp_path / "my_ship.json"), "mariner")
-    with pytest.raises(InputError, match="there is no such"):
-        load_suite(tmp_path / "other.toml")
-    (tmp_path / "other.toml").write_bytes(b"\xff\xfe")
-    with pytest.raises(InputError, match=r"other.toml: expected UTF-8"):
-        load_suite(tmp_path / "other.toml")
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from agents.export.c_structures import kind_of, numbers_of
 from agents.export.c_syntax import c_name, literal
 from agents.export.source import with_prelude
 from agents.export.translator import Translator
@@ -171,35 +170,6 @@ def test_each_construct_of_python_is_the_same_in_c(tmp_path):
             assert in_c(x) == expected, (plain.__name__, x)
 
 
-class Curve(NamedTuple):
-    """Straight lines between points."""
-
-    points: np.ndarray
-    values: np.ndarray
-    more: float
-
-
-def on_a_curve(x, curve):
-    return np.interp(x, curve.points, curve.values) + curve.more
-
-
-def test_tables_are_interpolated_as_numpy_does(tmp_path):
-    curve = Curve(np.array([-1.0, 0.2, 1.5]), np.array([3.0, -1.0, 0.5]), 0.25)
-    kind, c = kind_of(curve), Translator({}, "it")
-    name = c.function(on_a_curve, float, kind).name
-    type_name = c.structures.type(kind)
-    value = c.structures.initialiser(kind, numbers_of(curve))
-    constant = f"static const {type_name} CURVE = {value};"
-    head = "double f(double x)"
-    public = [f"{head};", f"{head} {{ return {name}(x, CURVE); }}"]
-    body = [*c.structures.texts, constant, *c.functions, *public]
-    text = with_prelude("it", "\n".join(body))
-    in_c = built(tmp_path, "it", "", text).f
-    in_c.restype, in_c.argtypes = ctypes.c_double, [ctypes.c_double]
-    for x in np.linspace(-2.0, 2.0, 41).tolist():
-        assert in_c(x) == on_a_curve(x, curve)
-
-
 def unwritable(x):
     """What C has no word for."""
     return sum((x, x))
@@ -253,18 +223,6 @@ def test_what_c_has_no_words_for_is_refused_with_its_line(function, line, said):
 
 def wrap(x):
     return x
-
-
-def step(x):
-    return x
-
-
-def test_functions_of_one_name_are_numbered_from_the_second_on():
-    c = Translator({}, "ship")
-    functions = (mathematics.wrap, wrap, mathematics.wrap)
-    names = [c.function(one, float).name for one in functions]
-    assert names == ["ship_wrap", "ship_wrap2", "ship_wrap"]
-    assert c.function(step, float).name == "ship_step2"
 
 
 def test_numbers_and_names_are_those_of_c():
