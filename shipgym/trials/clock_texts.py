@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,13 +25,6 @@ def unit_since_1970(number: float) -> str | None:
     return next(fitting, None)
 
 
-class Clock(NamedTuple):
-    """Times of a log's rows, read from texts."""
-
-    seconds: Floats  # nan where a text is empty
-    dated: bool  # counted from 1970, else of the day
-
-
 def zone_seconds(zone: str, where: str) -> float:
     """Seconds that a clock is ahead of UTC, from a text such as "+02:00" or "UTC".
 
@@ -48,12 +41,12 @@ def zone_seconds(zone: str, where: str) -> float:
     return (ahead or timedelta()).total_seconds()
 
 
-def read_clock(texts: Sequence[str]) -> Clock:
-    """Read dates and times in any usual form, or times of the day.
+def read_clock(texts: Sequence[str]) -> Floats:
+    """Seconds since 1970 of dates and times in any usual form, or of times of the day.
 
-    Times of the day go on at midnight. Where day and month may be exchanged, that order
-    is taken with which the texts span the shorter time. Raises ValueError, with the
-    text, where one is no time.
+    NaN where a text is empty. Times of the day go on at midnight. Where day and month
+    may be exchanged, that order is taken with which the texts span the shorter time.
+    Raises ValueError, with the text, where one is no time.
     """
     first = next((text for text in texts if text), "")
     of_day = _TIME_OF_DAY.fullmatch(first) is not None
@@ -67,7 +60,7 @@ def read_clock(texts: Sequence[str]) -> Clock:
         raise ValueError(texts[row])
     if of_day:
         seconds[is_known] = np.unwrap(seconds[is_known], period=DAY)
-    return Clock(seconds, dated=not of_day)
+    return seconds
 
 
 def _series(texts: Sequence[str]) -> Any:
@@ -120,13 +113,15 @@ def _implausibility(seconds: Any) -> tuple[int, float]:
     return int(missing.sum()), float(span)
 
 
+def is_dated(seconds: float) -> bool:
+    """Return whether a time counts from 1970, not from midnight."""
+    return bool(seconds > 2.0 * DAY)
+
+
 def clock_text(seconds: float) -> str:
     """Write a time since 1970, or of the day, as ISO 8601 does."""
     moment = datetime.fromtimestamp(round(seconds, 1), UTC)
-    is_of_day = seconds < 2.0 * DAY
-    if is_of_day:
-        return moment.strftime("%H:%M:%S")
-    return moment.strftime("%Y-%m-%d %H:%M:%S")
+    return moment.strftime("%Y-%m-%d %H:%M:%S" if is_dated(seconds) else "%H:%M:%S")
 
 
 def spread_evenly(moments: Integers, t: Floats, tick: float, usual: int) -> Floats:

@@ -6,7 +6,7 @@ import numpy as np
 
 from shipgym.checks import shown
 from shipgym.errors import InputError
-from shipgym.trials.clock_texts import DAY, clock_text, read_clock
+from shipgym.trials.clock_texts import DAY, clock_text, is_dated, read_clock
 from shipgym.trials.resampling import FEWEST_SAMPLES, Log
 from shipgym.trials.units import DEGREE
 
@@ -88,7 +88,7 @@ def _seconds(moment: float | str, log: Log, where: str) -> float:
     if not isinstance(moment, str):
         return float(moment)
     try:
-        clock = read_clock([moment])
+        (seconds,) = read_clock([moment])
     except ValueError:
         raise InputError(f"{where} cut: {_EXPECTED}, got {moment!r}") from None
     if log.start is None:
@@ -96,8 +96,8 @@ def _seconds(moment: float | str, log: Log, where: str) -> float:
             f"{where} cut: expected seconds of the log's time, which has no clock, got"
             f" {moment!r}"
         )
-    after = float(clock.seconds[0]) - log.start
-    if clock.dated:
+    after = float(seconds) - log.start
+    if is_dated(seconds):
         return after
     after %= DAY
     is_before = after >= log.t[-1] + 0.5 * DAY

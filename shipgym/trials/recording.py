@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -64,14 +63,6 @@ class Recording:
     notes: list[str] = field(default_factory=list)
 
 
-class _Track(NamedTuple):
-    """Positions of the rows, m from the first one; nan where there is none."""
-
-    north: Floats
-    east: Floats
-    outliers: int
-
-
 def read_recording(
     table: LogTable,
     columns: Mapping[str, Column] | None,
@@ -99,10 +90,8 @@ def read_recording(
     channels = _read_numbers(locator, notes)
     outliers = 0
     if "lat" in chosen:
-        track = _local_track(locator, times.t, repair, notes)
-        outliers = track.outliers
-        channels["x"] = track.north
-        channels["y"] = track.east
+        north, east, outliers = _local_track(locator, times.t, repair, notes)
+        channels |= {"x": north, "y": east}
         chosen["x"] = replace(chosen["lat"], unit="m")
         chosen["y"] = replace(chosen["lon"], unit="m")
 
@@ -207,10 +196,10 @@ def _continuous(
 
 def _local_track(
     locator: Locator, t: Floats, repair: str | None, notes: list[str]
-) -> _Track:
-    """Positions by north and east of the first one.
+) -> tuple[Floats, Floats, int]:
+    """Positions by north and east of the first one, m, and the number of outliers.
 
-    Outliers are refused unless they are to be filled.
+    NaN where there is none. Outliers are refused unless they are to be filled.
     """
     columns = locator.columns
     lat, lon, none = read_positions(locator.table, columns["lat"], columns["lon"])
@@ -225,7 +214,7 @@ def _local_track(
     is_known = np.isfinite(lat + lon + t)
     rows = np.flatnonzero(is_known)
     if not rows.size:
-        return _Track(north, east, outliers=0)
+        return north, east, 0
 
     lat = lat[rows]
     lon = lon[rows]
@@ -246,7 +235,7 @@ def _local_track(
     kept = rows[is_near]
     north[kept] = x[is_near]
     east[kept] = y[is_near]
-    return _Track(north, east, outliers=int(is_far.sum()))
+    return north, east, int(is_far.sum())
 
 
 def _own_signal(

@@ -145,7 +145,7 @@ def _week_times(
 def _read_clock_cells(table: LogTable, column: Column, cells: list[str]) -> Floats:
     """Seconds since 1970 or of the day; InputError for the first invalid cell."""
     try:
-        return read_clock(cells).seconds
+        return read_clock(cells)
     except ValueError as error:
         wrong = str(error)
     row = cells.index(wrong) if wrong in cells else 0

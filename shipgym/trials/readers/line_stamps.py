@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
@@ -69,8 +70,6 @@ def read_stamps(texts: Sequence[str]) -> Floats:
         unit = unit_since_1970(float(np.median(numbers)))
         seconds[rows] = numbers * UNITS["time"][unit or "s"]
         return seconds
-    try:
-        seconds[rows] = read_clock(chosen).seconds
-    except ValueError:  # such as 25:00:00
-        return seconds
+    with suppress(ValueError):  # such as 25:00:00
+        seconds[rows] = read_clock(chosen)
     return seconds

@@ -9,7 +9,7 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
-from shipgym.trials.clock_texts import DAY, clock_text, spread_evenly
+from shipgym.trials.clock_texts import DAY, clock_text, is_dated, spread_evenly
 from shipgym.trials.readers.line_stamps import read_stamps
 from shipgym.trials.readers.messages import BySource, Heard, Value
 
@@ -113,11 +113,6 @@ def _increasing(t: Floats, lines: Floats, source: str) -> Clock:
     never_back = np.maximum.accumulate(t)
     t, first = np.unique(never_back, return_index=True)
     return Clock(t, lines[first], source)
-
-
-def is_dated(time: float) -> bool:
-    """Return whether a time counts from 1970, not from midnight."""
-    return bool(time > 2.0 * DAY)
 
 
 def _ahead(stamps: Clock, values: list[Value]) -> Floats:

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.trials.readers.message_clock import Clock, is_dated, times_of
+from shipgym.trials.clock_texts import is_dated
+from shipgym.trials.readers.message_clock import Clock, times_of
 from shipgym.trials.readers.messages import BySource, Heard, port_source
 from shipgym.trials.resampling import FEWEST_SAMPLES
 from shipgym.trials.units import DEGREE

@@ -3,7 +3,6 @@
 import re
 import zlib
 from pathlib import Path
-from typing import NamedTuple
 
 from shipgym.errors import InputError
 from shipgym.files import LARGEST_CSV, MIB, read_bytes, shipped_toml
@@ -13,13 +12,6 @@ LARGEST_UNPACKED = 256 * MIB
 #: Encodings of several bytes a character, and Cyrillic: none is refused by its bytes
 #: alone, so that the words decide.
 _FOREIGN = ("cp932", "gb18030", "euc_jp", "big5", "euc_kr", "cp1251")
-
-
-class LogText(NamedTuple):
-    """Lines of a text, and its encoding where it is not UTF-8."""
-
-    lines: list[str]
-    encoding: str
 
 
 def read_log_bytes(path: Path, what: str) -> bytes:
@@ -56,9 +48,10 @@ def check_unpacked(path: Path, size: int) -> None:
         )
 
 
-def text_lines(path: Path, content: bytes) -> LogText:
+def text_lines(path: Path, content: bytes) -> tuple[list[str], str]:
     """Lines of a text in UTF-8, UTF-16, Latin-1 or, by its words, another encoding.
 
+    The encoding, empty for UTF-8 and Latin-1, comes with them.
     Raises InputError for more than a million, and with the line for bytes that are no
     text.
     """
@@ -69,7 +62,7 @@ def text_lines(path: Path, content: bytes) -> LogText:
         raise InputError(
             f"{path}: expected at most {most} lines, got {len(lines)}; split the file"
         )
-    return LogText(lines, encoding)
+    return lines, encoding
 
 
 def _decode(path: Path, content: bytes) -> tuple[str, str]:
