@@ -2,10 +2,13 @@
 
 The output-error method of Maine & Iliff 1985, NASA RP-1138: noise is only in what is
 compared, while equation-error methods regress on noisy velocities, which biases them.
+Trials are sailed in segments, each from a start that is fitted too (multiple shooting,
+Bock 1983): whole trials would let a drift of heading leak into the coefficients.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,16 +19,30 @@ from identification.models.least_squares import (
     fit_least_squares,
 )
 from identification.models.segments import BLOCK, Segment
-from identification.models.shooting import Shooter, Shooting
-from shipgym.arrays import Floats
+from identification.models.shooting import channel_units, in_all_lanes, sail_lanes
+from shipgym import ShipModel
+from shipgym.arrays import Floats, Integers
+from shipgym.engine.records import LANES
 from shipgym.trials.resampling import usual_step
+
+
+@dataclass(frozen=True, eq=False)
+class Shooting:
+    """Errors of all segments at a set of parameters."""
+
+    #: simulated less measured, by the scale of the channel, blocks averaged: those of
+    #: all segments one after the other, the channels of a block together, shape
+    #: (n_rows,)
+    residuals: Floats
+    jacobian: Floats  # shape (n_rows, n_parameters)
+    moves: list[Floats]  # by segment: how its start would move, shape (n_free,)
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
     """Parameters of least cost, and where the last round of the fit ended."""
 
-    parameters: Floats  # as `Shooter.shoot` takes them
+    parameters: Floats  # as `OutputError.shoot` takes them
     scales: Floats  # of the residuals by channel, shape (n_channels,)
     pull: float  # to the start, as `OutputError.solve` takes it
     shooting: Shooting
@@ -38,10 +55,24 @@ class Solution:
 class OutputError:
     """A fit by the errors of simulated segments: what is compared, and from where."""
 
-    shooter: Shooter
+    model: ShipModel  # gives the compiled accelerations and all but their coefficients
+    channels: Sequence[str]  # that are compared; starts of segments are fitted in them
+    #: coefficients of the accelerations (SI) that stand for a parameter of 1, shape
+    #: (n_coefficients,)
+    term_sizes: Floats
     segments: Sequence[Segment]  # of the trials
     start: Floats  # parameters to begin with, toward which the coefficients are pulled
     staggered: bool  # whether a second set of segments has each sample once more
+
+    @cached_property
+    def columns(self) -> list[int]:
+        """Places of the channels in the state."""
+        return [self.model.state_names.index(name) for name in self.channels]
+
+    @cached_property
+    def units(self) -> Floats:
+        """Units in which the channels are compared."""
+        return channel_units(self.model, self.channels)
 
     @property
     def n_samples(self) -> int:
@@ -51,7 +82,7 @@ class OutputError:
     @property
     def bin_width(self) -> float:
         """Bins of time in which residuals are added up, s: blocks or sampling steps."""
-        travel_time = self.shooter.model.travel_time
+        travel_time = self.model.travel_time
         width = float(BLOCK * travel_time)
         for segment in self.segments:
             if len(segment.times) > 1:
@@ -59,11 +90,97 @@ class OutputError:
                 width = max(width, step)
         return width
 
+    def shoot(
+        self, parameters: Floats, segments: Sequence[Segment], scales: Floats
+    ) -> Shooting:
+        """Residuals and Jacobian at some parameters, without what the starts explain.
+
+        The residual of a segment is what a linear step of its start leaves (variable
+        projection, Golub & Pereyra 1973, SIAM J. Numer. Anal. 10(2), with the Jacobian
+        of Kaufman 1975). `parameters`: coefficients by `term_sizes`, shape
+        (n_coefficients,); `scales`: residuals that count as 1, shape (n_channels,). Not
+        finite where a ship ran away.
+        """
+        coefficients = parameters * self.term_sizes
+        residuals, jacobians, moves = [], [], []
+        for segment in segments:
+            errors, slopes = self._block_errors(coefficients, segment, scales)
+            residual, slopes, move = without_start(errors, slopes, len(self.columns))
+            residuals.append(residual)
+            jacobians.append(slopes)
+            moves.append(move)
+        return Shooting(
+            residuals=np.concatenate(residuals),
+            jacobian=np.concatenate(jacobians),
+            moves=moves,
+        )
+
+    def moved(
+        self, segments: Sequence[Segment], moves: Sequence[Floats]
+    ) -> list[Segment]:
+        """The segments with their starts moved."""
+        found = []
+        for segment, move in zip(segments, moves, strict=True):
+            start = segment.start.copy()
+            start[self.columns] += move * self.units
+            found.append(replace(segment, start=start))
+        return found
+
+    def _block_errors(
+        self, coefficients: Floats, segment: Segment, scales: Floats
+    ) -> tuple[Floats, Floats]:
+        """Errors of a segment averaged over blocks, and their slopes, in scales.
+
+        Shapes (n_rows,) and (n_rows, n_coefficients + n_channels).
+        """
+        blocks = segment.blocks
+        counts = segment.block_sizes
+        factors = np.sqrt(counts)[:, None] / scales
+
+        channels, slopes = self._channels(coefficients, segment)
+        with np.errstate(invalid="ignore", over="ignore"):  # of ships that ran away
+            errors = channels - segment.measured
+            errors = factors * averaged(errors, blocks, counts)
+            slopes = factors[:, :, None] * averaged(slopes, blocks, counts)
+        return errors.ravel(), slopes.reshape(errors.size, -1)
+
+    def _channels(
+        self, coefficients: Floats, segment: Segment
+    ) -> tuple[Floats, Floats]:
+        """Simulated channels, and their slopes by parameter and start.
+
+        Forward differences of parameters that are about 1: in each lane but the first
+        one number of the ship or the start is larger by a step.
+        """
+        numbers = self.model.ship_numbers()
+        n_numbers = len(numbers)
+        first_term = n_numbers - len(coefficients)  # the terms' numbers come last
+        nominal = np.concatenate([numbers, segment.start])
+        nominal[first_term:n_numbers] = coefficients
+        starts = [n_numbers + column for column in self.columns]
+        varied = np.append(np.arange(first_term, n_numbers), starts).astype(int)
+        units = np.concatenate([self.term_sizes, self.units])
+
+        step = 1e-5
+        parts = []
+        for begin in range(0, len(varied), LANES - 1):
+            rows = varied[begin : begin + LANES - 1]
+            lane = 1 + np.arange(len(rows))
+            lanes = in_all_lanes(nominal)
+            lanes[rows, lane] += step * units[begin : begin + LANES - 1]
+
+            ships, begun = lanes[:n_numbers], lanes[n_numbers:]
+            sailed = sail_lanes(self.model, segment, ships, begun)[:, self.columns]
+            channels = sailed[:, :, 0]
+            with np.errstate(invalid="ignore", over="ignore"):  # of ships that ran away
+                changes = sailed[:, :, lane] - channels[:, :, None]
+                parts.append(changes / step)
+        return channels, np.concatenate(parts, axis=2)
+
     def start_scales(self) -> Floats:
         """Scales of the residuals at the start; not finite where a ship runs away."""
-        shooter = self.shooter
-        shooting = shooter.shoot(self.start, self.segments, shooter.units)
-        return self.scales(shooting, shooter.units)
+        shooting = self.shoot(self.start, self.segments, self.units)
+        return self.scales(shooting, self.units)
 
     def scales(self, shooting: Shooting, scales: Floats) -> Floats:
         """Root mean square of the residuals by channel, per sample.
@@ -75,7 +192,7 @@ class OutputError:
         squares = np.sum(errors**2, axis=0)
         # a residual is a mean over a block, times the root of its samples
         rms = np.sqrt(squares / self.n_samples)
-        smallest = 1e-9 * self.shooter.units
+        smallest = 1e-9 * self.units
         return np.asarray(np.maximum(rms, smallest))
 
     def pull_weight(self, pull: float) -> float:
@@ -101,11 +218,11 @@ class OutputError:
             fit = self._fit(parameters, segments, scales, weight)
             parameters = fit.x
             evaluations += fit.nfev
-            shooting = self.shooter.shoot(parameters, segments, scales)
-            segments = self.shooter.moved(segments, shooting.moves)
+            shooting = self.shoot(parameters, segments, scales)
+            segments = self.moved(segments, shooting.moves)
             scales = self.scales(shooting, scales)
 
-        before = self.shooter.shoot(self.start, last_segments, last_scales)
+        before = self.shoot(self.start, last_segments, last_scales)
         return Solution(
             parameters=parameters,
             scales=last_scales,
@@ -126,7 +243,7 @@ class OutputError:
         """Parameters of least cost between two renewals of scales and starts."""
 
         def linearised(parameters: Floats) -> Linearised:
-            shooting = self.shooter.shoot(parameters, segments, scales)
+            shooting = self.shoot(parameters, segments, scales)
             pulled = weight * (parameters - self.start)
             return Linearised(
                 residuals=np.concatenate([shooting.residuals, pulled]),
@@ -158,7 +275,7 @@ class OutputError:
         inverse = self._inverse_information(solution)
         scores = self._scores(solution.shooting)
         factor = self._freedom_factor(solution.shooting, inverse)
-        sizes = self.shooter.term_sizes
+        sizes = self.term_sizes
 
         influences = []
         for trial_scores in scores:
@@ -201,7 +318,7 @@ class OutputError:
         rows = shooting.jacobian * shooting.residuals[:, None]
 
         # the channels of a block stand together
-        n_channels = len(self.shooter.channels)
+        n_channels = len(self.channels)
         n_parameters = rows.shape[1]
         blocks = rows.reshape(-1, n_channels, n_parameters)
         scores = blocks.sum(axis=1)
@@ -220,6 +337,35 @@ class OutputError:
         starts = sum(len(move) for move in shooting.moves) / repeats
         left = n_samples - parameters - starts
         return n_samples / max(left, 1.0)
+
+
+def averaged(values: Floats, blocks: Integers, counts: Integers) -> Floats:
+    """Means over blocks along the first axis, from their first samples and sizes."""
+    sums = np.add.reduceat(values, blocks)
+    sizes = np.expand_dims(counts, tuple(range(1, values.ndim)))
+    return np.asarray(sums / sizes)
+
+
+def without_start(
+    residual: Floats, slopes: Floats, n_free: int
+) -> tuple[Floats, Floats, Floats]:
+    """Residuals and slopes without what a move of the start explains, and that move.
+
+    The last `n_free` columns of the slopes are those by the start. Of a ship that ran
+    away nothing is taken out.
+    """
+    others = slopes[:, :-n_free]
+    by_start = slopes[:, -n_free:]
+    finite = np.isfinite(slopes).all() and np.isfinite(residual).all()
+    if not finite:
+        return residual, others, np.zeros(n_free)
+
+    q, r = np.linalg.qr(by_start)
+    explained = q.T @ residual
+    move, *_ = np.linalg.lstsq(r, -explained, rcond=1e-10)
+    residual = residual - q @ explained
+    others = others - q @ (q.T @ others)
+    return residual, others, move
 
 
 def in_bins(scores: Floats, segments: Sequence[Segment], width: float) -> list[Floats]:

@@ -12,7 +12,6 @@ from identification.models.guard import GuardedFit, reasons_unstable
 from identification.models.output_error import OutputError, Solution
 from identification.models.refinement import Refinement
 from identification.models.segments import compared_channels, cut
-from identification.models.shooting import Shooter
 from identification.samples.samples import Samples
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
@@ -123,7 +122,9 @@ def _posed(start: GuardedFit, task: FitTask, settings: Refinement) -> OutputErro
     sizes = np.concatenate([term_sizes(task.samples, q) for q in equations])
     values = np.concatenate([start.estimators[q].coef_ for q in equations])
     return OutputError(
-        shooter=Shooter(blank, channels, sizes),
+        model=blank,
+        channels=channels,
+        term_sizes=sizes,
         segments=cut(
             task.trials,
             blank,
@@ -151,7 +152,7 @@ def term_sizes(samples: Samples, equation: str) -> Floats:
 
 
 def _model(blank: ShipModel, problem: OutputError, parameters: Floats) -> ShipModel:
-    accelerations = parameters * problem.shooter.term_sizes
+    accelerations = parameters * problem.term_sizes
     values = np.linalg.solve(blank.acceleration_matrix, accelerations)
     return blank.with_coefficients(np.asarray(values, dtype=float))
 
@@ -160,7 +161,7 @@ def _estimators(
     start: GuardedFit, problem: OutputError, parameters: Floats
 ) -> Estimators:
     """The start's estimators with the refined coefficients, for the diagnostics."""
-    coefficients = parameters * problem.shooter.term_sizes
+    coefficients = parameters * problem.term_sizes
     estimators = {}
     for q, rows in start.model.table.regression_rows.items():
         refined = copy.copy(start.estimators[q])
@@ -176,7 +177,7 @@ def _report(problem: OutputError, solution: Solution) -> dict[str, Any]:
         "cost_before": solution.cost_before,
         "cost_after": solution.cost_after,
         "evaluations": solution.evaluations,
-        "residual_rms": by_name(problem.shooter.channels, solution.scales),
+        "residual_rms": by_name(problem.channels, solution.scales),
         "pull": solution.pull,
         "decision": "refined",
     }
