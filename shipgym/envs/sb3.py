@@ -13,7 +13,6 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
 from shipgym.arrays import Flags, Floats
-from shipgym.checks import check_choice
 from shipgym.envs.ship_vector_env import Infos, ShipVectorEnv
 from shipgym.errors import InputError
 from shipgym.extras import library
@@ -108,8 +107,6 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         Number of ships; by default 1, or that of the given environment.
     seed : int, optional
         Row i has the seed `seed + i`, as if `seed` was called.
-    info_names : sequence of str
-        Entries of `info` that every step gives for every ship, which takes time.
     **options
         Of the environment, `threads` among them.
     """
@@ -120,7 +117,6 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         num_envs: int | None = None,
         *,
         seed: int | None = None,
-        info_names: Sequence[str] = (),
         **options: Any,
     ) -> None:
         self.vector_env: Any = _native(env, num_envs, options)
@@ -134,10 +130,6 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         )
         self.metadata: dict[str, Any] = dict(self.vector_env.metadata)
         self.spec = self.vector_env.spec
-        self.info_names = tuple(info_names)
-        for name in self.info_names:
-            check_choice(name, self._ships.task.info_names, "info_names")
-
         self._returns = np.zeros(n)
         self._lengths = np.zeros(n, dtype=np.int64)
         self._actions: Any = None
@@ -205,8 +197,6 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         for row in self._touched:
             self._infos[row] = {}
         self._touched = []
-        if self.info_names:
-            self._show(infos)
         if dones.any():
             self._touched = np.flatnonzero(dones).tolist()
         for row in self._touched:
@@ -215,12 +205,6 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
             self._returns[row] = 0.0
             self._lengths[row] = 0
         return observations, rewards.astype(np.float32), dones, self._infos
-
-    def _show(self, infos: Infos) -> None:
-        """Put the infos of every step into new dictionaries."""
-        columns = [infos[name].tolist() for name in self.info_names]
-        for row, values in enumerate(zip(*columns, strict=True)):
-            self._infos[row] = dict(zip(self.info_names, values, strict=True))
 
     def _last_info(self, row: int, infos: Infos, truncated: bool) -> dict[str, Any]:
         """Info of a row whose episode ended."""

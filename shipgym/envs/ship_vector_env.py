@@ -315,10 +315,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
 
 
 def _mode(given: AutoresetMode | str) -> AutoresetMode:
-    by_name: dict[AutoresetMode | str, AutoresetMode] = {}
-    for mode in AutoresetMode:
-        by_name |= {mode: mode, mode.value: mode, mode.name: mode}
-    if given not in by_name:
+    try:
+        return AutoresetMode(given)
+    except ValueError:
         modes = quoted(mode.value for mode in AutoresetMode)
-        raise unexpected("autoreset_mode", f"one of {modes}", given)
-    return by_name[given]
+        raise unexpected("autoreset_mode", f"one of {modes}", given) from None
