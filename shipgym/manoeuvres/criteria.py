@@ -6,6 +6,7 @@ from the covariance, if the manoeuvre lies within the envelope of the trials.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -102,52 +103,117 @@ def _chances_by_model(
     return Chances(passes, fails)
 
 
-def worse_measured(sides: Sequence[Side]) -> MeasuredIndex | None:
-    """The largest index that trials measured; None without any."""
-    found = [side.measured for side in sides if side.measured is not None]
-    return max(found, key=lambda measured: measured.value, default=None)
-
-
-def worse_side(sides: Sequence[Side]) -> str:
-    """Name of the side whose index is largest, by trials or else by the model."""
-    measured = worse_measured(sides)
-    if measured is not None:
-        return measured.side
-    values = {}
-    for side in sides:
-        value = side.drawn.value
-        values[side.name] = np.inf if value is None else value
-    return max(values, key=lambda name: values[name])
-
-
 @dataclass(frozen=True)
 class Criterion:
-    """One criterion; the worse of the two sides counts."""
+    """One criterion; the worse of the two sides counts.
 
-    value: float | None  # of the model, in `unit`; None where it did not finish
+    There is a verdict by measured trials, or by a model within the envelope of its
+    trials, with 97.5 % certainty.
+    """
+
     limit: float  # largest value allowed
-    # None where it is not decided, or the ship's equations do not allow the test: see
-    # `note`
-    passed: bool | None
     unit: str  # "ship lengths" or "deg"
     source: str  # paragraph of the annex of MSC.137(76)
-    # the value over models drawn from the covariance of an identified ship
-    drawn: IndexInterval | None = None
-    note: str = ""  # remarks
-    #: whether there is a verdict: by measured trials, or by a model within the
-    #: envelope of its trials, with 97.5 % certainty
-    decided: bool = True
-    #: the worse of the trials that are the manoeuvre; it goes before the model's
-    measured: float | None = None
     #: such as "35 deg turn", with the rudder's limit where that is less
     manoeuvre: str = ""
-    measured_error: float | None = None  # standard error of what was measured
-    side: str = ""  # the worse side: of the trials, without any of the model
-    decided_by: str | None = None  # "trials", "model" or "trials and model"
-    certainty: float | None = None  # of the verdict
-    #: where it is not decided: the trials that were not run, one to a side
-    deciding_trials: tuple[str, ...] = ()
-    sides: tuple[Side, ...] = ()  # what is known on each
+    # what is known on each; none where the ship's equations do not allow the test
+    sides: tuple[Side, ...] = ()
+    remark: str = ""
+
+    @cached_property
+    def drawn(self) -> IndexInterval | None:
+        """The index over models drawn from the covariance, on the worse side."""
+        return worst([side.drawn for side in self.sides]) if self.sides else None
+
+    @property
+    def value(self) -> float | None:
+        """The index of the model, in `unit`; None where it did not finish."""
+        return None if self.drawn is None else self.drawn.value
+
+    @property
+    def worse_measured(self) -> MeasuredIndex | None:
+        """The worse of the trials that are the manoeuvre; None without any."""
+        found = [side.measured for side in self.sides if side.measured is not None]
+        return max(found, key=lambda measured: measured.value, default=None)
+
+    @property
+    def measured(self) -> float | None:
+        """The index that trials measured; it goes before the model's."""
+        found = self.worse_measured
+        return None if found is None else found.value
+
+    @property
+    def measured_error(self) -> float | None:
+        """Standard error of what was measured."""
+        found = self.worse_measured
+        return None if found is None else found.error
+
+    @property
+    def side(self) -> str:
+        """The worse side: of the trials, without any of the model."""
+        if self.worse_measured is not None:
+            return self.worse_measured.side
+        values = {}
+        for side in self.sides:
+            value = side.drawn.value
+            values[side.name] = np.inf if value is None else value
+        return max(values, key=lambda name: values[name], default="")
+
+    @cached_property
+    def _chances(self) -> Chances:
+        return chances_of(self.sides, self.limit)
+
+    @property
+    def decided(self) -> bool:
+        """True where there is a verdict."""
+        return bool(self.sides) and self._chances.is_sure
+
+    @property
+    def passed(self) -> bool | None:
+        """The verdict; None without one."""
+        if not self.decided:
+            return None
+        return self._chances.passes > self._chances.fails
+
+    @property
+    def certainty(self) -> float | None:
+        """Certainty of the verdict."""
+        return max(self._chances) if self.decided else None
+
+    @property
+    def decided_by(self) -> str | None:
+        """Evidence for the verdict: "trials", "model" or "trials and model"."""
+        if not self.decided:
+            return None
+        measured = [side for side in self.sides if side.measured is not None]
+        if not measured:
+            return "model"
+        by_trials = chances_of(measured, self.limit)
+        all_measured = len(measured) == len(self.sides)
+        if all_measured or (by_trials.is_sure and not self.passed):
+            return "trials"
+        return "trials and model"
+
+    @property
+    def deciding_trials(self) -> tuple[str, ...]:
+        """Without verdict: the trials that were not run, one to a side."""
+        if self.decided:
+            return ()
+        left = [side.name for side in self.sides if side.measured is None]
+        return tuple(side_in_words(self.manoeuvre, name) for name in left)
+
+    @property
+    def note(self) -> str:
+        """Remarks: why there is no verdict, and which trials would decide."""
+        if self.decided or not self.sides:
+            return self.remark if self.measured is None else ""
+        note = f"not decided by these trials: {_why_undecided(self)}"
+        trials = self.deciding_trials
+        if len(trials) == 1:
+            note += f"; run a {trials[0]}"
+        elif trials:
+            note += f"; run a {self.manoeuvre} to both sides"
+        return note
 
     @property
     def interval(self) -> tuple[float, float | None] | None:
@@ -164,12 +230,11 @@ class Criterion:
     @property
     def probability(self) -> float | None:
         """Probability to pass, by trials and models drawn; None if undecided."""
-        if not self.decided:
-            return None
+        certainty = self.certainty
         by_value = self.measured is None and self.share_passed is None
-        if by_value or self.certainty is None:
-            return self.share_passed
-        return self.certainty if self.passed else 1.0 - self.certainty
+        if by_value or certainty is None:
+            return None
+        return certainty if self.passed else 1.0 - certainty
 
     def to_dict(self) -> dict[str, Any]:
         """Dictionary ready for JSON."""
@@ -204,81 +269,19 @@ class Criterion:
 
 
 def criterion_of(
-    rule: Rule, sides: Sequence[Side], manoeuvre: str = "", note: str = ""
+    rule: Rule, sides: Sequence[Side], manoeuvre: str = "", remark: str = ""
 ) -> Criterion:
     """A rule judged on the worse side; an incomplete run fails it.
 
     `sides`: what is known of the index on each; `manoeuvre`: the trial in words.
     """
-    drawn = worst([side.drawn for side in sides])
-    criterion = Criterion(
-        value=drawn.value,
+    return Criterion(
         limit=rule.limit,
-        passed=None,
         unit=rule.unit,
         source=rule.source,
-        drawn=drawn,
-        note=note,
         manoeuvre=manoeuvre,
         sides=tuple(sides),
-    )
-    return judged(criterion)
-
-
-def judged(criterion: Criterion) -> Criterion:
-    """The criterion with its verdict, or with the trial that would decide it."""
-    sides = criterion.sides
-    measured = worse_measured(sides)
-    chances = chances_of(sides, criterion.limit)
-    criterion = replace(
-        criterion,
-        side=worse_side(sides),
-        measured=None if measured is None else measured.value,
-        measured_error=None if measured is None else measured.error,
-    )
-    if not chances.is_sure:
-        return _undecided(criterion)
-    passed = chances.passes > chances.fails
-    return replace(
-        criterion,
-        passed=passed,
-        decided=True,
-        decided_by=_source_of(criterion, passed),
-        certainty=max(chances),
-        deciding_trials=(),
-        note="" if measured is not None else criterion.note,
-    )
-
-
-def _source_of(criterion: Criterion, passed: bool) -> str:
-    """Evidence that decides a criterion: "trials", "model", or both."""
-    measured = [side for side in criterion.sides if side.measured is not None]
-    if not measured:
-        return "model"
-    by_trials = chances_of(measured, criterion.limit)
-    all_measured = len(measured) == len(criterion.sides)
-    if all_measured or (by_trials.is_sure and not passed):
-        return "trials"
-    return "trials and model"
-
-
-def _undecided(criterion: Criterion) -> Criterion:
-    """The criterion without verdict, with the trials that are left to run."""
-    left = [side.name for side in criterion.sides if side.measured is None]
-    trials = [side_in_words(criterion.manoeuvre, name) for name in left]
-    note = f"not decided by these trials: {_why_undecided(criterion)}"
-    if len(trials) == 1:
-        note += f"; run a {trials[0]}"
-    elif trials:
-        note += f"; run a {criterion.manoeuvre} to both sides"
-    return replace(
-        criterion,
-        passed=None,
-        decided=False,
-        decided_by=None,
-        certainty=None,
-        deciding_trials=tuple(trials),
-        note=note,
+        remark=remark,
     )
 
 
@@ -345,9 +348,6 @@ def with_measured(
             if name in found:
                 sides = _with_trial(found[name].sides, measured)
                 found[name] = replace(found[name], sides=sides)
-    for name, criterion in found.items():
-        if worse_measured(criterion.sides) is not None:
-            found[name] = judged(criterion)
     return found
 
 

@@ -108,7 +108,7 @@ def stopping_criterion(
             STOPPING,
             [side],
             manoeuvre=STOPPING.manoeuvre,
-            note=note,
+            remark=note,
         )
     why = "its equations hold for a shaft turning ahead only"
     if "n" not in model.command_names:
@@ -116,12 +116,4 @@ def stopping_criterion(
             "its thrust is inside its surge coefficients, so it cannot be ordered"
             " astern"
         )
-    return Criterion(
-        value=None,
-        limit=STOPPING.limit,
-        passed=None,
-        unit=STOPPING.unit,
-        source=STOPPING.source,
-        note=f"not assessable: {why}",
-        decided=False,
-    )
+    return criterion_of(STOPPING, [], remark=f"not assessable: {why}")
