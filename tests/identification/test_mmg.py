@@ -108,42 +108,9 @@ def test_terms_beyond_the_standard_form_act_as_they_are_named() -> None:
         assert np.abs(at(ship, motion) - at(ship, mirrored) * [1, -1, -1])[2] > 1e-4
     alike = at(ship_of(sides), motion) - at(ship_of(sides), mirrored) * [1, -1, -1]
     np.testing.assert_allclose(alike, 0.0, atol=1e-15)
-    for x in (0.05, 0.4, 1.0, 1.5):
-        assert mmg.power_law(x, -0.7) == pytest.approx(x**-0.7, rel=1e-11)
-    assert mmg.power_law(0.01, 1.0) == pytest.approx(
-        0.01, rel=5e-10
-    )  # from here to 4 times service speed
-    assert mmg.power_law(4.0, 1.0) == pytest.approx(4.0, rel=1e-14)
-    assert mmg.power_law(0.0, 1.0) == mmg.power_law(0.01, 1.0)
-    assert mmg.power_law(9.0, 1.0) == mmg.power_law(4.0, 1.0)
 
 
-def test_twin_screws_and_rudders_count() -> None:
-    one, two = (
-        dict(
-            zip(
-                ("d", "V", "xG", "k", "D", "A", "eta", "N"),
-                mmg.dimensions(p).values(),
-                strict=True,
-            )
-        )
-        for p in (
-            L7,
-            replace(
-                L7,
-                propellers=2.0,
-                rudders=2.0,
-                rudder_area=2 * L7.require("rudder_area"),
-            ),
-        )
-    )
-    assert (one["eta"], two["eta"]) == pytest.approx(
-        (0.216 / 0.345,) * 2
-    )  # each in a race of its own
-    assert (one["N"], two["N"]) == (1.0, 2.0)
-    assert (
-        mmg.dimensions(replace(L7, propellers=2.0))["eta"] == 0.0
-    )  # one rudder between the races
+def test_twin_screws_count() -> None:
     ahead = Motion(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 11.85)
     surge = [
         at(ship_of({}, replace(L7, propellers=n)), ahead)[0] for n in (1.0, 2.0, 3.0)
