@@ -1,6 +1,6 @@
 """Which autopilots are given, and what they do on ships of other equations.
 
-    python scripts/autopilots.py [--rows autopilots.jsonl] [--ships kcs,ferry]
+    python scripts/autopilots.py [--rows autopilots.jsonl] [--ships kcs,bulk-carrier]
 
 prints the tables of "On ships that nobody designed for" in docs/controllers.md. Each
 ship of tests/ships is put through zigzags 10/10 and 20/20 to both sides with the noise

@@ -64,7 +64,7 @@ NORRBIN = "norrbin"
 IN_RANGE, BEYOND = "in range", "beyond"
 PARTS = (IN_RANGE, BEYOND)
 KINDS = ("indices", "motion")
-QUICK = ("naval-vessel", "ferry", "kcs")
+QUICK = ("naval-vessel", "bulk-carrier", "kcs")
 Key = tuple[str, str]  # a manoeuvre and the name of an index
 
 

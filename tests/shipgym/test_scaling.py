@@ -7,7 +7,7 @@ import pytest
 
 import shipgym
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, scale_model
-from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
+from shipgym.manoeuvres import zigzag, zigzag_indices
 from shipgym.ships import Envelope
 from shipgym.ships.structures import get_structure
 
@@ -31,29 +31,6 @@ def small_ship(name: str) -> ShipModel:
         SteeringGear(35.0, 5.0, 1.0),
         coefficients,
         service_shaft_speed=1.2 if name == "surge" else 0.0,
-    )
-
-
-def test_a_model_of_the_mariner_sails_the_same_circle_in_ship_lengths():
-    """At the same Froude number a 1:50 model is sqrt(50) times as quick."""
-    ship = shipgym.load_model("mariner")
-    model = scale_model(ship, length=160.93 / 50.0)
-    assert model.particulars.speed == pytest.approx(7.7175 / np.sqrt(50.0))
-    assert model.particulars.mass == pytest.approx(ship.particulars.mass / 50.0**3)
-    assert model.particulars.mass_prime == pytest.approx(ship.particulars.mass_prime)
-    assert model.coefficients == ship.coefficients
-    assert model.steering.rudder_rate_deg_s == pytest.approx(5.0 * np.sqrt(50.0))
-    slow, quick = (
-        turning_circle(s, 35, duration=d, dt=dt)
-        for s, d, dt in (
-            (ship, 900, 0.5),
-            (model, 900 / np.sqrt(50.0), 0.5 / np.sqrt(50.0)),
-        )
-    )
-    np.testing.assert_allclose(quick["x"] * 50.0, slow["x"], rtol=1e-9, atol=1e-6)
-    full, small = (turning_indices(t) for t in (slow, quick))
-    assert small.tactical_diameter_lengths == pytest.approx(
-        full.tactical_diameter_lengths, rel=1e-9
     )
 
 

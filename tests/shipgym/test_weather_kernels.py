@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import shipgym
-from shipgym import InputError, manoeuvres
+from shipgym import InputError
 from shipgym.envs.engine import Engine
 from shipgym.models.simulate import simulate
 from shipgym.sea import (
@@ -174,24 +174,6 @@ def test_instruments_show_the_motion_in_waves(mariner):
     )
     np.testing.assert_allclose(logged["r"], trial["r"] + trial["r_wave"], atol=1e-14)
     assert set(logged.channels) == {*STATE, "delta_command"}
-
-
-@pytest.mark.parametrize(
-    "run",
-    [
-        lambda ship, **sea: manoeuvres.zigzag(ship, duration=200.0, **sea),
-        lambda ship, **sea: manoeuvres.turning_circle(ship, duration=100.0, **sea),
-    ],
-)
-def test_manoeuvres_in_weather(mariner, run):
-    rough, again, calm = (
-        run(mariner, weather="rough", seed=1),
-        run(mariner, weather="rough", seed=1),
-        run(mariner),
-    )
-    np.testing.assert_array_equal(rough["psi"], again["psi"])
-    assert rough["wind_speed"].mean() > 8.0
-    assert rough["u"].mean() < calm["u"].mean()
 
 
 def engine(model, lanes, sea="rough", **task):
