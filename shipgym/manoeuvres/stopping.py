@@ -8,7 +8,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError, ManoeuvreError
-from shipgym.manoeuvres.execution import distance_sailed, reached, require, ship_length
+from shipgym.manoeuvres.execution import distance_sailed, require, ship_length
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.models import ShipModel
 from shipgym.models.by_name import takes_name
@@ -150,55 +150,29 @@ def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:
     return stopping(model, -shaft_of(model), speed_ratio=0.0, water_depth=water_depth)
 
 
-def stopping_indices(
-    trial: Trial, speed_ratio: float | None = None, length: float | None = None
-) -> StoppingIndices:
-    """Stopping distance of a stop, from the first sample, that of the order, on.
+def stopping_indices(trial: Trial) -> StoppingIndices:
+    """Stopping distance of a trial, from the order at its first sample to its end.
 
-    The trial has u, v, x, y and psi. She counts as stopped at `speed_ratio` of the
-    surge speed at the start, by default at the end of the trial; `length`, between
-    perpendiculars, m, is by default the trial's own. Raises InputError if a channel or
-    the length is missing, ManoeuvreError if the speed is never reached.
+    The trial has u, v, x, y and psi, and the ship's length. Raises InputError if a
+    channel or the length is missing.
     """
     require(trial, ("u", "v", "x", "y", "psi"), "a stopping trial")
-    lpp = ship_length(trial, length)
-    t = trial.t
+    lpp = ship_length(trial)
     psi = trial["psi"]
-    end = float(t[-1])
-    if speed_ratio is not None:
-        check_number(speed_ratio, "speed_ratio", at_least=0.0, below=1.0)
-        u = trial["u"]
-        end = _when(trial, -u, -speed_ratio * u[0])
 
     def change(values: Floats) -> float:
-        return float(np.interp(end, t, values - values[0]))
+        return float(values[-1] - values[0])
 
     north = change(trial["x"])
     east = change(trial["y"])
     ahead, aside = rotate_to_body(north, east, psi[0])
-    sailed = change(distance_sailed(trial))
-    heading_change = change(psi)
     return StoppingIndices(
-        track_reach_lengths=sailed / lpp,
+        track_reach_lengths=change(distance_sailed(trial)) / lpp,
         head_reach_lengths=float(ahead) / lpp,
         side_reach_lengths=float(aside) / lpp,
-        heading_change_deg=float(np.degrees(heading_change)),
-        time_s=end - float(t[0]),
+        heading_change_deg=float(np.degrees(change(psi))),
+        time_s=trial.duration,
     )
-
-
-def _when(trial: Trial, values: Floats, threshold: float) -> float:
-    """Time at which values first reach a threshold, by straight lines, s."""
-    time = reached(values, threshold, trial.t)
-    if time is None:
-        wanted = abs(threshold)
-        last = trial["u"][-1]
-        raise ManoeuvreError(
-            f"trial {trial.name!r}: expected a surge speed of {wanted:.3g} m/s, got"
-            f" {last:.3g} m/s at its end; give a larger speed_ratio",
-            trial,
-        )
-    return time
 
 
 def standard_stops(

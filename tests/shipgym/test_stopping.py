@@ -28,12 +28,13 @@ def test_a_container_ship_without_thrust_halves_its_speed_in_13_lengths():
     lengths.
     """
     model = load_model("container")
-    trial, numbers = stopping(model), model.coefficients
+    numbers = model.coefficients
     quarter, eighth = (
-        stopping_indices(trial, ratio).track_reach_lengths for ratio in (0.25, 0.125)
+        stopping_indices(stopping(model, speed_ratio=ratio)).track_reach_lengths
+        for ratio in (0.25, 0.125)
     )
     halving = np.log(2.0) * (numbers["m"] + numbers["mx"]) / -numbers["X_uu"]
-    assert eighth - quarter == pytest.approx(halving, rel=1e-3)
+    assert eighth - quarter == pytest.approx(halving, abs=1 / 40)  # a step
 
 
 @pytest.mark.parametrize("name", ["container", "kvlcc2"])
@@ -48,7 +49,7 @@ def test_coasting_straight_needs_no_sideways_room(name):
 def test_stopping_distance_of_a_stop_drawn_by_hand():
     """From 10 m/s at 0.1 m/s2 to the east.
 
-    500 m to standstill, 375 m to half the speed.
+    500 m to standstill.
     """
     t = np.arange(101.0)
     ahead = 10.0 * t - 0.05 * t**2
@@ -62,10 +63,9 @@ def test_stopping_distance_of_a_stop_drawn_by_hand():
     }
     trial = Trial(t, channels, length=50.0)
     assert stopping_indices(trial).track_reach_lengths == pytest.approx(10.0)
-    half = stopping_indices(trial, 0.5)
-    assert half.head_reach_lengths == pytest.approx(7.5)
-    assert half.side_reach_lengths == pytest.approx(0.0, abs=1e-12)
-    assert half.time_s == pytest.approx(50.0)
+    assert stopping_indices(trial).head_reach_lengths == pytest.approx(10.0)
+    assert stopping_indices(trial).side_reach_lengths == pytest.approx(0.0, abs=1e-12)
+    assert stopping_indices(trial).time_s == pytest.approx(100.0)
 
 
 def test_a_ship_that_does_not_stop_says_so_with_its_trial():
@@ -75,11 +75,6 @@ def test_a_ship_that_does_not_stop_says_so_with_its_trial():
     ) as error:
         stopping(tanker, speed_ratio=0.01)
     assert 0.0823 < error.value.trial["u"][-1] < 0.5
-    with pytest.raises(
-        ManoeuvreError, match="at its end; give a larger speed_ratio"
-    ) as error:
-        stopping_indices(stopping(tanker), 0.05)
-    assert isinstance(error.value.trial, Trial)
 
 
 @pytest.mark.parametrize(
