@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,15 +13,6 @@ from shipgym.trials.resampling import FEWEST_SAMPLES, usual_step
 
 #: The setting with which missing values are filled.
 REPAIR = ("repair", "interpolate")
-
-
-class FilledChannels(NamedTuple):
-    """Channels without missing values, SI units, between first and last whole row."""
-
-    t: Floats
-    channels: dict[str, Floats]
-    locator: Locator
-    counts: dict[str, int]  # values filled in, by channel
 
 
 def check_time(t: Floats, locator: Locator) -> None:
@@ -60,12 +50,12 @@ def _refuse_time(t: Floats, row: int, locator: Locator) -> None:
 
 def fill_missing(
     t: Floats, channels: Mapping[str, Floats], locator: Locator, repair: str | None
-) -> FilledChannels:
+) -> tuple[Floats, dict[str, Floats], Locator, dict[str, int]]:
     """Fill missing values by shape-preserving cubics (PCHIP) through their neighbours.
 
-    Rows at either end that lack a value are left out. Raises InputError where `repair`
-    is not "interpolate", a time is missing, less than half of the rows are whole, or a
-    hole is too long.
+    Rows at either end that lack a value are left out. Returns times, channels, locator
+    and counts of filled values. Raises InputError where `repair` is not "interpolate",
+    a time is missing, less than half of the rows are whole, or a hole is too long.
     """
     _check_present(t, channels, locator, repair)
     check_time(t, locator)
@@ -85,12 +75,7 @@ def fill_missing(
             values = _interpolated(t, values, is_missing, is_heading=is_heading)
         filled[name] = values
         counts[name] = int(is_missing.sum())
-    return FilledChannels(
-        t=t,
-        channels=filled,
-        locator=locator,
-        counts=counts,
-    )
+    return t, filled, locator, counts
 
 
 def _check_present(
