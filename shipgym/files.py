@@ -106,7 +106,8 @@ def read_bytes(path: Path, what: str, largest: int) -> bytes:
                 f"{path}: expected a {what} of at most {largest} bytes, got {size}"
                 " bytes; split it, or leave out what is not needed"
             )
-        return file.read(size)
+        # one byte of a file that claims to be empty, as those in /proc do
+        return file.read(max(size, 1))
 
 
 @contextmanager

@@ -123,7 +123,8 @@ class PathAhead:
             leg = arc.next_leg(leg)
             behind = np.array([leg.begins + leg.x, leg.y, leg.course])
             points = np.where(arc.passed, behind, points)
-        return Place(*points, turns=Turns(*to_come))
+        along, cross, course = points
+        return Place(along, cross, course, Turns(*to_come))
 
 
 def turned(ahead: Floats, aside: Floats, angle: Floats) -> tuple[Floats, Floats]:
