@@ -66,7 +66,6 @@ def select(
     fit: FitTrials,
     trials: Sequence[Trial],
     options: Options,
-    structures: Sequence[str] = STRUCTURES,
 ) -> Choice:
     """The structure and method that predict the heading of trials held out best.
 
@@ -87,7 +86,7 @@ def select(
         parts = [part.with_(kind=None) for part in pieces(to_fit[0])]
         held_out = "each third of the only trial"
     attempts = _Attempts(fit, parts, options)
-    attempts.add_all(structures)
+    attempts.add_all()
 
     ranked = attempts.by_rank()
     windy = in_wind(parts)
@@ -111,7 +110,7 @@ def select(
     if options.rudder_bias == "none":
         return found
     biased = f"{best.structure}-bias"
-    if biased in structures and options.method_is_default:
+    if biased in STRUCTURES and options.method_is_default:
         return _response_with_bias(found, biased, fit, trials)
     return _with_bias(found, fit, trials)
 
@@ -154,17 +153,17 @@ class _Attempts:
     refused: dict[str, str] = field(default_factory=dict)  # why, by name
     fits: dict[str, tuple[Options, Candidate]] = field(default_factory=dict)  # by name
 
-    def add_all(self, structures: Sequence[str]) -> None:
-        """Try structures, each by its usual methods, the best table by others too.
+    def add_all(self) -> None:
+        """Try all structures, each by its usual methods, the best table by others too.
 
         Raises InputError where none can be fitted.
         """
         free = self.options.method_is_default
-        for structure in counted("structures", structures):
+        for structure in counted("structures", STRUCTURES):
             if not free:
                 self.add(structure, self.options.method)
                 continue
-            usual, *_ = methods_of(structure, self.options.method)
+            usual = RM_SVM if structure == GREY_BOX else self.options.method
             self.add(structure, usual)
             if structure in RESPONSES:
                 self.add(structure, whole_trials())
@@ -209,15 +208,6 @@ def _of_usual_hull(given: Particulars | Mapping[str, Any]) -> Particulars:
     if not isinstance(given, Particulars):
         given = Particulars.from_mapping(given)
     return with_usual_hull(given)
-
-
-def methods_of(structure: str, usual: str) -> tuple[str, ...]:
-    """Methods that a structure is fitted by where none are named, the usual first."""
-    if structure == GREY_BOX:
-        return (RM_SVM,)
-    if structure == MMG:
-        return (usual,)
-    return (usual, *OTHERS)
 
 
 def reference_of(structure: str, named: Any) -> Any:
