@@ -207,7 +207,8 @@ def decompose_triangle(
 def _variations(uncentred: Floats, centred: Floats, n_samples: int) -> Floats:
     """Sizes of the centred features; 0 of those that are constant but for rounding."""
     size = _sizes(centred, n_samples)
-    smallest = CONSTANT * _sizes(uncentred, n_samples)
+    whole_size = _sizes(uncentred, n_samples)
+    smallest = CONSTANT * whole_size
     size[size <= smallest] = 0.0
     return size
 

@@ -128,7 +128,8 @@ def _error(model: ShipModel, trial: Trial) -> Floats | None:
     if run is None:
         return None
     name = _compared(trial)
-    return np.asarray(run[name] - trial[name])
+    error = run[name] - trial[name]
+    return np.asarray(error)
 
 
 def _size(scatter: Any) -> float:

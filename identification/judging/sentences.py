@@ -88,7 +88,8 @@ def sea_sentences(provenance: Mapping[str, Any]) -> list[str]:
     if "currents" in provenance:
         sentences += _current_sentences(provenance["currents"])
     if "wind" in provenance:
-        speeds = provenance["wind"]["mean_speeds"].values()
+        wind = provenance["wind"]
+        speeds = wind["mean_speeds"].values()
         low = min(speeds)
         high = max(speeds)
         sentences.append(

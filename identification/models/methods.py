@@ -122,7 +122,8 @@ def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Est
     invisible in the data and large in the turn. Its strength is relative to the terms'
     contribution there.
     """
-    window = float(np.mean(samples.duration))
+    mean_duration = np.mean(samples.duration)
+    window = float(mean_duration)
     penalty = len(samples) * strength**2
     C = 1.0 / penalty
     estimators: Estimators = {}
@@ -157,7 +158,8 @@ def method_options(name: str) -> tuple[str, ...]:
     kind = _kind(name)
     own: tuple[str, ...] = kind.options
     if kind is Refinement:
-        return (*own, *TruncatedLSSVM.options)
+        of_start = TruncatedLSSVM.options
+        return (*own, *of_start)
     return own
 
 

@@ -46,7 +46,8 @@ def plots(fit: Fit) -> dict[str, Figure]:
 
 def regression_figures(fit: Fit) -> dict[str, Figure]:
     """Figures of the regression by name; "l-curve" only where a rank was chosen."""
-    found = {"fit": fit_figure(fit), "residuals": residual_figure(fit)}
+    found = {"fit": fit_figure(fit)}
+    found["residuals"] = residual_figure(fit)
     curves = with_a_rank(fit)
     if curves:
         found["l-curve"] = l_curve_figure(curves)
