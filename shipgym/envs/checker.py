@@ -98,7 +98,7 @@ def _compare_reset(
     env: Vectors,
     reference: SyncVectorEnv,
     where: str,
-    seed: int | list[int] | None = None,
+    seed: Any = None,
     mask: Flags | None = None,
 ) -> None:
     answer = env.reset(seed=seed, options=_options(mask))
@@ -149,7 +149,7 @@ def _check_infos(infos: Any, n: int, where: str) -> None:
     for key, value in infos.items():
         if key.startswith("_"):
             continue
-        mask = infos.get(f"_{key}")
+        mask: Any = infos.get(f"_{key}")
         is_flags = isinstance(mask, np.ndarray) and mask.dtype == np.bool_
         if not is_flags or mask.shape != (n,):
             raise _differs(f"{where}: infos['_{key}']", f"a mask of {n} booleans", mask)

@@ -195,7 +195,7 @@ def _draw_path(chart: _Chart, engine: Engine, lane: int) -> None:
     waypoints = engine.waypoints(lane)
     if waypoints is None:
         return
-    points = track(waypoints, engine.path_metres("turn_radius"))
+    points: Any = track(waypoints, engine.path_metres("turn_radius"))
     corridor = engine.path_metres("corridor")
     if corridor is not None:
         half = corridor / chart.metres
@@ -236,7 +236,7 @@ def _draw_ship(
     stern = centre - 0.5 * length * ahead
     blade = stern - 0.22 * length * _direction(state["psi"] - state["delta"])
     chart.line(RUDDER, [stern, blade], 3 * FINER)
-    chart.polygon(HULL, _hull(*centre, state["psi"], length, beam))
+    chart.polygon(HULL, _hull(state["x"], state["y"], state["psi"], length, beam))
 
 
 def _draw_compass(chart: _Chart, state: dict[str, float]) -> None:
