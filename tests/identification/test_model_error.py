@@ -48,7 +48,7 @@ def test_the_covariance_in_the_model_is_the_scaled_one(
         scaled.model.covariance, error["factor"] ** 2 * bare.model.covariance
     )
     assert "model_error" not in bare.model.provenance
-    assert "scaled by" in scaled.summary()
+    assert "model error" in scaled.summary()
 
 
 def test_closed_loop_overshoots_do_not_depend_on_the_neutral_helm(
