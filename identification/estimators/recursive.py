@@ -22,6 +22,10 @@ from identification.arrays import column_rms, root_mean_square
 from identification.estimators.decomposition import check_scale, scales_of
 from identification.estimators.linear import LinearRegressor, validated
 from identification.estimators.lssvm import LSSVM
+from identification.estimators.recursive_kernels import (
+    innovation,
+    least_squares,
+)
 from shipgym.arrays import Floats
 from shipgym.checks import check_flag, check_number, check_whole
 
@@ -33,16 +37,6 @@ OPTIONS = (
     "start_interval",
     "start_C",
 )
-
-
-def innovation(error: Any, omega: float) -> Any:
-    """The error, or its bounded odd function of slope 1 at 0.
-
-    Source: Song 2020, equation 3-7, over omega.
-    """
-    if omega > 0.0:
-        return np.tanh(omega * error) / omega
-    return error
 
 
 class _Start(NamedTuple):
@@ -153,7 +147,7 @@ class Recursion(LinearRegressor):
 
         history = np.tile(theta, (n_samples, 1))
         self._advance(
-            scaled[rest],
+            np.ascontiguousarray(scaled[rest]),
             targets[rest] / unit,
             _Start(theta, covariance, scaled[picked]),
             history[rest],
@@ -212,45 +206,20 @@ class RecursiveLeastSquares(Recursion):
     options: ClassVar[tuple[str, ...]] = OPTIONS
 
     def _advance(self, phi: Floats, y: Floats, start: _Start, history: Floats) -> None:
-        theta, P = start.theta, start.covariance
-        update = self._one_by_one if self.inverse_free else self._together
-        for t in range(len(phi)):
-            if self.forgetting < 1.0:
-                self._forget(P)
-            last = slice(max(t - self.innovations + 1, 0), t + 1)
-            update(phi[last], y[last], theta, P)
-            history[t] = theta
-
-    def _forget(self, P: Floats) -> None:
-        """Divide a covariance by the forgetting, at most to the start's variances.
-
-        Rows and columns are stretched by the same factors, so that the matrix stays
-        positive.
-        """
-        smallest = np.finfo(float).tiny
-        room = np.sqrt(self.C / np.maximum(np.diag(P), smallest))
-        full = 1.0 / np.sqrt(self.forgetting)
-        stretch = np.clip(room, 1.0, full)
-        P *= np.outer(stretch, stretch)
-
-    def _one_by_one(self, phi: Floats, y: Floats, theta: Floats, P: Floats) -> None:
-        """Rank-one updates by the last samples (TMILS, Song 2020, equation 4-12)."""
-        for regressors, target in zip(phi, y, strict=True):
-            gain = P @ regressors
-            variance = 1.0 + regressors @ gain
-            error = target - regressors @ theta
-            theta += innovation(error, self.omega) / variance * gain
-            P -= np.outer(gain, gain) / variance
-
-    def _together(self, phi: Floats, y: Floats, theta: Floats, P: Floats) -> None:
-        """The matrix of innovations solved (MILS, Song 2020, equation 4-11)."""
-        errors = innovation(y - phi @ theta, self.omega)
-        from_features = phi @ P
-        covariance = np.eye(len(errors)) + from_features @ phi.T
-        gain = np.linalg.solve(covariance, from_features)
-        theta += errors @ gain
-        P -= from_features.T @ gain
-        P[:] = 0.5 * (P + P.T)  # else forgetting blows rounding errors up
+        n_features = phi.shape[1]
+        run = least_squares(self.inverse_free)
+        run(
+            phi,
+            y,
+            start.theta,
+            start.covariance,
+            np.full(n_features, float(self.C)),
+            float(self.forgetting),
+            self.innovations,
+            float(self.omega),
+            history,
+            np.empty(n_features),
+        )
 
 
 @dataclass(eq=False, repr=False)
