@@ -52,14 +52,12 @@ release-check: $(VENV)/dev-installed
 
 fuzz: $(VENV)/dev-installed
 	OMP_NUM_THREADS=1 $(BIN)/python scripts/fuzz.py --inputs 1000000
-	$(BIN)/python scripts/wrong_commands.py
 
 evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/reproduce.py all --markdown docs/reproduction.md || test $$? = 1  # 1: aims missed, as the page says
 	test ! -d $(DATA) || $(BIN)/python scripts/predict_real_ships.py --data $(DATA)
 	$(BIN)/shipgym benchmark --controllers lq,tuned-ilos,wheel-over,tuned-wheel-over,mpc,ppo --out build/suite
 	$(BIN)/python scripts/certainty.py --out build/certainty.jsonl
-	$(BIN)/python scripts/certainty.py --out build/certainty.jsonl --new
 	$(BIN)/python scripts/autopilots.py --rows build/autopilots.jsonl
 	$(BIN)/python scripts/bridge_logs.py
 	$(BIN)/python scripts/run_notebooks.py

@@ -41,6 +41,11 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
         Naming the file and the field at fault, or the difference to the model.
     """
     file = find_agent(path)
+    if file.suffix == ".zip":
+        raise InputError(
+            f"{path}: expected a file that runs no code, got one of stable-baselines3;"
+            " load it there, and write LearnedPolicy.from_sb3(agent).save('agent.json')"
+        )
     content = read_json(file, "controller file", REMEDY)
 
     agent: Agent

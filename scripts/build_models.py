@@ -241,10 +241,6 @@ MODELS: dict[str, Recipe] = {
     "container-two-zigzags": Recipe("container", two_zigzags),
 }
 
-ON_TANKER = {"structure": "grey-box", "method": "rm-svm", "reference_model": "tanker"}
-ON_KVLCC2 = {**ON_TANKER, "reference_model": "kvlcc2"}
-#: What did not become a model, for the page.
-
 
 def standard_errors_apart(model: ShipModel, shipped: ShipModel) -> float:
     """Largest difference of a coefficient from the shipped one, in standard errors."""

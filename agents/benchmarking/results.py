@@ -296,7 +296,8 @@ def load_results(path: str | Path) -> BenchmarkResult:
     check_fields(summary, FIELDS, str(where), REMEDY)
     if summary["sha256"] != _summary_hash(summary):
         raise InputError(
-            f"{where}: expected what the benchmark wrote, got other content; {REMEDY}"
+            f"{where}: expected what the benchmark wrote, got other content; remove it"
+            " and run `shipgym benchmark --resume` again"
         )
     episodes = _read_episodes(where.with_name(EPISODES), summary["episodes"])
     return BenchmarkResult(dict(summary), episodes)

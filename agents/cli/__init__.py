@@ -132,7 +132,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
         "--suite shipgym-v1 --controllers pid,lq,ppo --out results/",
     ),
     "reproduce": (reproduce_command, "cao2015 --markdown tables.md"),
-    "replay": (replay_command, "recordings/episode-0.json --out replay.html"),
+    "replay": (replay_command, "recordings/episode-00000.json --out replay.html"),
     "doctor": (doctor_command, "--json"),
 }
 

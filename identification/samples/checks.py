@@ -20,8 +20,8 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
     if structure.captive:
         raise InputError(
             "structure: expected one for free-running trials, got"
-            f" '{structure.name}', whose added masses only forces of captive tests tell;"
-            " choose another, such as 'abkowitz'"
+            f" '{structure.name}', whose added masses only captive tests tell; choose"
+            " another, such as 'abkowitz'"
         )
     if not trials:
         raise InputError(

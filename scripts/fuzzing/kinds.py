@@ -39,8 +39,7 @@ from shipgym.files import LARGEST_TOML, read_bytes
 from shipgym.trials.guesses import guess_trial
 
 SHOWN = Console(file=io.StringIO(), width=120)
-JOBS: list[dict[str, Any]] = [{"number": 1}, {"number": 2}]
-N_PART = 3  # episodes of a kept part of a benchmark
+JOBS: list[dict[str, Any]] = [{"number": 1}]
 
 
 def written(fields: Any) -> None:
@@ -132,14 +131,14 @@ def squared(job: dict[str, Any]) -> dict[str, Any]:
 
 def keep_results(folder: Path) -> None:
     """Results of jobs, as a benchmark or a study that goes on finds them."""
-    run_jobs(squared, JOBS[:1], JobEngine(keep=folder))
+    run_jobs(squared, JOBS, JobEngine(keep=folder))
 
 
 def read_kept(path: Path) -> Any:
     """Jobs of which some are done."""
     folder, text = path.parent, job_to_json(JOBS[0], "job")
     kept = KeptResults(folder, squared).load(text)
-    return None if kept is None else run_jobs(squared, JOBS[:1], JobEngine(keep=folder))
+    return None if kept is None else run_jobs(squared, JOBS, JobEngine(keep=folder))
 
 
 SUITE = load_suite()

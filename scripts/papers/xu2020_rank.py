@@ -86,12 +86,6 @@ def decomposition() -> tuple[Floats, Floats, Floats]:
     return left, values, right
 
 
-def reduced_values() -> Floats:
-    """Singular values of the columns of the 18 terms alone."""
-    columns = problem().X[:, problem().coefficients != 0.0]
-    return np.asarray(np.linalg.svd(columns, compute_uv=False))
-
-
 @cache
 def errors(noise: float) -> Errors:
     """Errors by rank, and at the rank that the L-curve chooses."""

@@ -44,16 +44,6 @@ def test_of_collinear_one_is_dropped() -> None:
 
 
 PARTICULARS = Particulars(length=160.93, speed=7.7175)
-TRUE = {
-    "b_v": -0.06,
-    "b_r": -2.3,
-    "b_|v|r": -0.9,
-    "b_d": -0.08,
-    "c_v": -1e-3,
-    "c_r": -0.104,
-    "c_|v|r": -0.03,
-    "c_d": 3.7e-3,
-}
 
 
 def test_what_cannot_be_reduced_is_named() -> None:
