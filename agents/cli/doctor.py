@@ -118,8 +118,17 @@ def cache_finding() -> Finding:
             f"{folder} cannot be written ({error.strerror}): what it lacks is compiled"
             f" again in each process; set {CACHE_VARIABLE} to a folder that can be",
         )
-    size = sum(path.stat().st_size for path in files) / 1e6
-    return Finding("cache", "fine", f"{folder}, {len(files)} files, {size:.1f} MB")
+    sizes = [size for path in files if (size := size_of(path)) is not None]
+    megabytes = sum(sizes) / 1e6
+    return Finding("cache", "fine", f"{folder}, {len(sizes)} files, {megabytes:.1f} MB")
+
+
+def size_of(path: Path) -> int | None:
+    """Size of a file in bytes; None if it is gone, as a draft of another process."""
+    try:
+        return path.stat().st_size
+    except FileNotFoundError:
+        return None
 
 
 def name_finding(name: str) -> Finding:

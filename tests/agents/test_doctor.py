@@ -6,6 +6,7 @@ import json
 from typer.testing import CliRunner
 
 from agents.cli import app
+from agents.cli.doctor import size_of
 
 
 def doctor():
@@ -31,6 +32,12 @@ def test_doctor_tells_place_and_size_of_the_cache(tmp_path, monkeypatch):
     found, code = doctor()
     assert (found["cache"][0], code) == ("wrong", 1)
     assert "is compiled again in each process" in found["cache"][1]
+
+
+def test_a_file_that_vanishes_while_it_is_measured_is_left_out(tmp_path):
+    (tmp_path / "it.loop").write_bytes(bytes(10))
+    assert size_of(tmp_path / "it.loop") == 10
+    assert size_of(tmp_path / "gone.loop") is None
 
 
 def test_needed_packages_extras_and_names_of_others_are_told_apart(monkeypatch):
