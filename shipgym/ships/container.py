@@ -192,6 +192,18 @@ def accelerations(
     x_HR = c.x_R + c.a_H * c.x_H
     N = N_H + x_HR * F_N * cos_delta
 
+    udot = X * (1.0 / (c.m + c.mx))
+    vdot, pdot, rdot = coupled_accelerations(Y, K, N, c)
+
+    linear = U * U * (1.0 / L)
+    angular = U * U * (1.0 / (L * L))
+    return udot * linear, vdot * linear, rdot * angular, pdot * angular, 0.0
+
+
+def coupled_accelerations(
+    Y: float, K: float, N: float, c: Any
+) -> tuple[float, float, float]:
+    """Solve the equations of motion in sway, roll and yaw, prime system."""
     # [m + m_y      -m_y l_y    m_y alpha_y] [vdot]   [Y]
     # [-m_y l_y     I_x + J_x   0          ] [pdot] = [K]
     # [m_y alpha_y  0           I_z + J_z  ] [rdot]   [N]
@@ -201,15 +213,11 @@ def accelerations(
     d = c.Ix + c.Jx
     e = c.Iz + c.Jz
     determinant = a * d * e - b * b * e - g * g * d
-    udot = X * (1.0 / (c.m + c.mx))
     coupled = d * e * Y - b * e * K - g * d * N
     vdot = coupled * (1.0 / determinant)
     pdot = (K - b * vdot) * (1.0 / d)
     rdot = (N - g * vdot) * (1.0 / e)
-
-    linear = U * U * (1.0 / L)
-    angular = U * U * (1.0 / (L * L))
-    return udot * linear, vdot * linear, rdot * angular, pdot * angular, 0.0
+    return vdot, pdot, rdot
 
 
 def propeller(
