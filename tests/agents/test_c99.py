@@ -498,4 +498,5 @@ void hand_over(void) {}
 void wait_for_next_interval(double seconds) { (void)seconds; }
 void control_loop(void);
 """
-    built(tmp_path, "lq", source.header, source.source + loop + stubs)
+    program = built(tmp_path, "lq", source.header, source.source + loop + stubs)
+    assert program.control_loop

@@ -80,7 +80,7 @@ def read(tmp_path, lines, name="log.nmea", end="\r\n"):
     return guess_trial(path).trial
 
 
-def check(trial, step=1.0, rows=240, turned=0.0, kept=slice(None)):
+def assert_as_sailed(trial, step=1.0, rows=240, turned=0.0, kept=slice(None)):
     """Heading, rudder and speed are those of the ship, row by row."""
     truth = sailed(rows, step)
     t = np.array([one.t for one in truth])[kept]
@@ -96,7 +96,7 @@ def check(trial, step=1.0, rows=240, turned=0.0, kept=slice(None)):
         assert np.abs(trial["u"] - SPEED)[2:-2].max() < 0.1
 
 
-def said(trial, *words):
+def assert_said(trial, *words):
     for word in words:
         assert any(word in note for note in trial.notes), (word, trial.notes)
 
@@ -139,21 +139,21 @@ STAMPS = {
 def test_times_before_the_lines_are_a_clock(stamp, with_fix, tmp_path):
     kinds = (rmc, hdt, rsa) if with_fix else (hdt, rsa)
     trial = read(tmp_path, stamped(STAMPS[stamp], *kinds), "log.txt")
-    check(trial)
+    assert_as_sailed(trial)
     if not with_fix:
-        said(trial, "no speed is known")
+        assert_said(trial, "no speed is known")
 
 
 def test_a_recorder_in_another_zone_takes_the_time_of_the_satellites(tmp_path):
     trial = read(tmp_path, stamped(half_past, rmc, hdt, rsa))
-    check(trial)
-    said(trial, "7200.5 s ahead of those of GPRMC")
+    assert_as_sailed(trial)
+    assert_said(trial, "7200.5 s ahead of those of GPRMC")
 
 
 @pytest.mark.parametrize("name", ["log", "log.log", "log.vdr", "log.nmea.gz", "a.csv"])
 @pytest.mark.parametrize("end", ["\r\n", "\n", "\r"])
 def test_the_name_of_a_file_and_its_ends_of_lines_do_not_matter(name, end, tmp_path):
-    check(read(tmp_path, plain(rmc, hdt, rsa), name, end))
+    assert_as_sailed(read(tmp_path, plain(rmc, hdt, rsa), name, end))
 
 
 @pytest.mark.parametrize(
@@ -161,7 +161,7 @@ def test_the_name_of_a_file_and_its_ends_of_lines_do_not_matter(name, end, tmp_p
     [(hdt, rsa, rmc), (rsa, hdt, gll), (rmc, hdt, rsa, gll), (hdt, rmc, rsa)],
 )
 def test_sentences_of_one_second_stand_in_any_order(kinds, tmp_path):
-    check(read(tmp_path, plain(*kinds)))
+    assert_as_sailed(read(tmp_path, plain(*kinds)))
 
 
 @pytest.mark.parametrize(
@@ -200,19 +200,19 @@ def test_sentences_of_one_second_stand_in_any_order(kinds, tmp_path):
 )
 def test_what_sentences_hold_is_read(kinds, words, tmp_path):
     trial = read(tmp_path, plain(*kinds))
-    check(trial)
-    said(trial, *words)
+    assert_as_sailed(trial)
+    assert_said(trial, *words)
 
 
 def test_a_heading_that_stays_magnetic_says_so_until_the_variation_is_given(tmp_path):
     trial = read(tmp_path, plain(rmc, hdm, rsa))
-    check(trial, turned=-16.0)
-    said(trial, "the heading stays magnetic")
+    assert_as_sailed(trial, turned=-16.0)
+    assert_said(trial, "the heading stays magnetic")
     assert trial.magnetic
 
     turned = {"variation_deg": 16.0}
     trial = Trial.from_csv(tmp_path / "log.nmea", sensors=turned)
-    check(trial)
+    assert_as_sailed(trial)
     assert not trial.magnetic
     assert not any("magnetic" in note for note in trial.notes)
 
@@ -222,16 +222,18 @@ def test_the_talker_with_the_data_is_read(tmp_path):
     for at in (30, 300, 600):
         lines[at + 1] = sentence("HEHDT,123.4,T")
     trial = read(tmp_path, lines)
-    check(trial)
-    said(trial, "psi is from IIHDT (237 values); HEHDT (3 values) left out")
+    assert_as_sailed(trial)
+    assert_said(trial, "psi is from IIHDT (237 values); HEHDT (3 values) left out")
 
 
 def test_sentences_without_checksums_are_read(tmp_path):
     lines = [line[:-3] for line in plain(rmc, hdt, rsa)]
     lines[301] = lines[301][:9]  # cut short
     trial = read(tmp_path, lines)
-    check(trial)
-    said(trial, "719 of 720 sentences have no checksum", "1 of 720 sentences with a")
+    assert_as_sailed(trial)
+    assert_said(
+        trial, "719 of 720 sentences have no checksum", "1 of 720 sentences with a"
+    )
 
 
 def test_a_cut_sentence_among_protected_ones_is_left_out(tmp_path):
@@ -239,8 +241,8 @@ def test_a_cut_sentence_among_protected_ones_is_left_out(tmp_path):
     lines[301] = "$HEHDT,4"
     lines[400] += lines[401][:7]
     trial = read(tmp_path, lines)
-    check(trial)
-    said(trial, "2 of 721 sentences")
+    assert_as_sailed(trial)
+    assert_said(trial, "2 of 721 sentences")
 
 
 def test_a_faster_gyro_is_spread_over_the_second(tmp_path):
@@ -252,7 +254,9 @@ def test_a_faster_gyro_is_spread_over_the_second(tmp_path):
         lines.append(sentence(hdt(one)))
     path = tmp_path / "log.nmea"
     path.write_text("\n".join(lines))
-    check(guess_trial(path).trial, step=0.2, rows=1200, kept=slice(None, None, 5))
+    assert_as_sailed(
+        guess_trial(path).trial, step=0.2, rows=1200, kept=slice(None, None, 5)
+    )
 
 
 def test_whole_seconds_of_a_fast_receiver_are_spread(tmp_path):
@@ -260,12 +264,12 @@ def test_whole_seconds_of_a_fast_receiver_are_spread(tmp_path):
     for one in sailed(1200, 0.2):
         whole = one._replace(t=math.floor(one.t + 1e-9))
         lines += [sentence(rmc(whole)), sentence(hdt(one)), sentence(rsa(one))]
-    check(read(tmp_path, lines), step=0.2, rows=1200)
+    assert_as_sailed(read(tmp_path, lines), step=0.2, rows=1200)
 
 
 def test_a_log_without_dates_goes_over_midnight(tmp_path):
     evening = datetime(2021, 5, 3, 23, 58, tzinfo=UTC).timestamp()
-    check(read(tmp_path, plain(lambda one: gll(one, evening), hdt, rsa)))
+    assert_as_sailed(read(tmp_path, plain(lambda one: gll(one, evening), hdt, rsa)))
 
 
 def test_a_pause_of_the_recorder_is_a_hole(tmp_path):
@@ -322,8 +326,8 @@ def test_deltas_of_signal_k_are_read_and_other_vessels_left_out(of, tmp_path):
         lines += deltas(one, context=own, of=of)
         lines += deltas(one._replace(psi=10.0), context=other)[2:] * 4
     trial = read(tmp_path, lines, "log.jsonl")
-    check(trial)
-    said(trial, f"960 deltas of other vessels than {own} left out")
+    assert_as_sailed(trial)
+    assert_said(trial, f"960 deltas of other vessels than {own} left out")
 
 
 def test_a_multiplexed_log_of_a_signal_k_server_is_read(tmp_path):
@@ -332,7 +336,7 @@ def test_a_multiplexed_log_of_a_signal_k_server_is_read(tmp_path):
         before = f"{1000 * (BEGIN + one.t):.0f}"
         lines += [f"{before};N;{sentence(kind(one))}" for kind in (rmc, rsa)]
         lines.append(f"{before};I;{deltas(one)[0]}")
-    check(read(tmp_path, lines, "signalk-raw.log"))
+    assert_as_sailed(read(tmp_path, lines, "signalk-raw.log"))
 
 
 # --- NMEA 2000
@@ -407,10 +411,10 @@ def test_raw_frames_of_nmea_2000_are_decoded(form, magnetic, tmp_path):
         for pgn, data in pgns(one, magnetic).items()
     ]
     trial = read(tmp_path, lines, "log.txt")
-    check(trial)
+    assert_as_sailed(trial)
     assert "r" not in trial.derived
     if magnetic:
-        said(trial, "with the variation of PGN 127258 of 35 added, 16.0 deg E")
+        assert_said(trial, "with the variation of PGN 127258 of 35 added, 16.0 deg E")
 
 
 def test_raw_frames_without_their_package_are_one_message(tmp_path, monkeypatch):
@@ -475,7 +479,7 @@ def test_what_canboat_prints_is_read(form, tmp_path):
     lines = ["INFO 2025-12-16T17:22:41.995Z [analyzer] New PGN 127245 for device 127"]
     for one in sailed():
         lines += form(one)
-    check(read(tmp_path, lines, "analyzed.txt"))
+    assert_as_sailed(read(tmp_path, lines, "analyzed.txt"))
 
 
 # --- what can only be looked at

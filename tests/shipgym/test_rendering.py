@@ -4,6 +4,7 @@ import warnings
 
 import gymnasium
 import numpy as np
+import pygame
 import pytest
 
 from shipgym.envs import rendering
@@ -92,8 +93,10 @@ def test_a_window_opens_and_closes_without_a_screen(monkeypatch):
     env = make(COURSE, render_mode="human")
     env.reset(seed=0)
     env.step(np.zeros(1, dtype=np.float32))
+    assert pygame.display.get_init()
     env.close()
     env.close()
+    assert not pygame.display.get_init()
 
 
 def test_rows_of_a_vector_environment_have_their_own_pictures():

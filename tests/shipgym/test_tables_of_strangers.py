@@ -74,7 +74,7 @@ def written(path, edit=as_is, names=NAMES, *, above=(), below=(), delimiter=",")
     return text
 
 
-def check(guess, *, positive="starboard", speeds=True):
+def assert_as_sailed(guess, *, positive="starboard", speeds=True):
     """The log is the one that was sailed."""
     trial = guess.trial
     assert (len(trial), trial.duration) == (N, pytest.approx(N - 1.0, abs=0.5))
@@ -152,7 +152,7 @@ def test_a_table_is_read_as_what_it_is_and_says_why(tmp_path, kind):
     edit, layout, words = READ[kind]
     written(tmp_path / "log.csv", edit, **layout)
     guess = guess_trial(tmp_path / "log.csv")
-    check(guess, positive="port" if words == "side port" else "starboard")
+    assert_as_sailed(guess, positive="port" if words == "side port" else "starboard")
     reading = [
         f"{key}: in {text.partition(' in ')[2]}" for key, text in guess.reading.items()
     ]
@@ -180,7 +180,7 @@ def test_a_table_is_read_as_what_it_is_and_says_why(tmp_path, kind):
 def test_names_of_many_languages_are_known(tmp_path, names):
     written(tmp_path / "log.csv", names=names.split(","))
     guess = guess_trial(tmp_path / "log.csv")
-    check(guess)
+    assert_as_sailed(guess)
     assert not guess.unused
 
 
@@ -197,7 +197,7 @@ def test_names_of_many_languages_are_known(tmp_path, names):
 def test_encodings_and_gzip(tmp_path, encoding, names):
     text = written(tmp_path / "log.csv", names=names, delimiter=";").replace(".", ",")
     (tmp_path / "log.csv.gz").write_bytes(gzip.compress(text.encode(encoding)))
-    check(guess_trial(tmp_path / "log.csv.gz"))
+    assert_as_sailed(guess_trial(tmp_path / "log.csv.gz"))
 
 
 def test_without_positions_the_unit_of_a_speed_is_said_to_be_a_guess(tmp_path):
@@ -271,7 +271,7 @@ def test_a_sheet_may_have_titles_and_a_row_of_units(tmp_path):
     frame = pandas.DataFrame([["Trial"] + 6 * [None], NAMES, units, *rows])
     frame.to_excel(tmp_path / "log.xlsx", index=False, header=False)
     guess = guess_trial(tmp_path / "log.xlsx")
-    check(guess)
+    assert_as_sailed(guess)
     assert "unit from the row of units" in guess.reading["sog"]
 
 
@@ -305,7 +305,7 @@ def test_a_clock_that_was_set_forward_is_told_from_a_gap(tmp_path, is_gap):
     notes = " ".join(guess.trial.notes)
     assert ("the clock was set forward by 40 s after 120 s" in notes) is not is_gap
     if not is_gap:
-        check(guess)
+        assert_as_sailed(guess)
 
 
 def test_two_rudders_are_read_as_their_mean_with_the_bias_of_each(tmp_path):
@@ -317,7 +317,7 @@ def test_two_rudders_are_read_as_their_mean_with_the_bias_of_each(tmp_path):
         names,
     )
     guess = guess_trial(path)
-    check(guess)
+    assert_as_sailed(guess)
     assert guess.unused == []
     assert "'Rudder Stbd', which shows 2 deg less" in guess.reading["delta"]
     notes = " ".join(guess.trial.notes)
@@ -342,5 +342,5 @@ def test_parts_of_a_time_in_columns_are_one_time(tmp_path, names, layouts):
 
     written(path, edit, [*names.split(","), *NAMES[1:]])
     guess = guess_trial(path)
-    check(guess)
+    assert_as_sailed(guess)
     assert guess.unused == []
