@@ -79,7 +79,8 @@ def imported() -> list[tuple[str, str]]:
     """Classes and functions imported in pages, README and examples, with modules."""
     pages = [path for path in (ROOT / "docs").rglob("*.md") if path.parent != PAGES]
     found = set[tuple[str, str]]()
-    for path in (ROOT / "README.md", *pages, *(ROOT / "examples").rglob("*.py")):
+    tasks = (ROOT / "shipgym" / "examples").glob("[a-z]*.py")
+    for path in (ROOT / "README.md", *pages, *tasks):
         for module, inside, line in IMPORT.findall(path.read_text(encoding="utf-8")):
             given = re.split(r"[,\n]", inside or line)
             used = {one.split(" as ")[0].strip() for one in given}

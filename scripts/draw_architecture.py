@@ -94,6 +94,8 @@ def level(module: str) -> tuple[int, int, str]:
     rank = list(LAYERS).index(package)
     if module == package:  # its __init__: public names, from every room
         return rank, len(LAYERS[package]) + 1, package
+    if room == "examples":  # users' files, above the public names
+        return rank, len(LAYERS[package]) + 2, package
     for k, layer in enumerate(LAYERS[package], 1):
         if room in layer:
             return rank, k, f"{package}.{room}"

@@ -5,7 +5,6 @@
 The ships are steered by plain rules, to be in the middle of what there is to do.
 """
 
-import runpy
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,10 +26,10 @@ class Shown(NamedTuple):
 
 
 SHOWN = (
-    Shown("encounter", {"case": 17}, 1.0, 16),
-    Shown("berth", {}, 0.35, 40),
-    Shown("river", {}, 0.7, 25),
-    Shown("fairway", {}, 0.7, 80),
+    Shown("Encounter", {"case": 17}, 1.0, 16),
+    Shown("Berth", {}, 0.35, 40),
+    Shown("River", {}, 0.7, 25),
+    Shown("Fairway", {"dt": 5.0}, 0.7, 80),
 )
 
 
@@ -47,16 +46,9 @@ def main() -> None:
 
 def picture(shown: Shown) -> Image.Image:
     """Sail an example for some steps, and draw it."""
-    source = ROOT / "examples" / f"{shown.name}.py"
-    usual = {"dt": 5.0}
-    if shown.name == "fairway":
-        usual = {"model": "kvlcc2", "action": "rudder-shaft", "dt": 5.0}
-    options = runpy.run_path(str(source)).get("OPTIONS", usual)
     env = gymnasium.make(
-        "shipgym:shipgym/CourseKeeping-v0",
-        task=str(source),
+        f"shipgym.examples:examples/{shown.name}-v0",
         render_mode="rgb_array",
-        **options,
         **shown.settings,
     )
     env.reset(seed=0)

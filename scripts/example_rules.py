@@ -5,19 +5,18 @@
     python scripts/example_rules.py berth --tune 60   # search the rule's numbers
 
 Judged on 100 episodes that none of them has seen. A search (CMA-ES) has episodes of
-its own and so many seconds of processor; it begins with the numbers of
-`examples/berth_rule.py` or `encounter_rule.py` and prints what it finds. The agent is
-stable-baselines3's PPO with its defaults. The row
-"lowest" has the lowest cost in each episode of the rule with 40 draws of its numbers:
-it is no rule, since nobody knows beforehand which are best.
+its own and so many seconds of processor; it begins with the numbers of the rule's file
+in `shipgym/examples` and prints what it finds. The agent is stable-baselines3's PPO
+with its defaults. The row "lowest" has the lowest cost in each episode of the rule with
+40 draws of its numbers: it is no rule, since nobody knows beforehand which are best.
 """
 
 import argparse
 import runpy
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
+import gymnasium
 import numpy as np
 import torch
 from stable_baselines3 import PPO
@@ -28,8 +27,8 @@ from agents.suites.suite import BenchmarkTask
 from agents.training.controller_search import FIRST_SEED, SearchBudget, search
 from agents.training.controller_space import factor
 from shipgym.arrays import Floats
+from shipgym.examples import FOLDER
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
 SEARCHED = FIRST_SEED + np.arange(100)
 JUDGED = 1_000_000 + np.arange(100)
 N_DRAWS = 40
@@ -71,11 +70,15 @@ def main() -> None:
 
 def task_of(name: str) -> BenchmarkTask:
     """The example as a task of a benchmark."""
-    path = EXAMPLES / f"{name}.py"
-    options = {"model": "mariner-tls-svm", "dt": 5.0}
-    options |= runpy.run_path(str(path)).get("OPTIONS", {})
-    model = str(options.pop("model"))
-    return BenchmarkTask(name, str(path), model, options=options)
+    options = {"model": "mariner-tls-svm", **gymnasium.spec(id_of(name)).kwargs}
+    task = options.pop("task")
+    model = options.pop("model")
+    return BenchmarkTask(name, task, model, options=options)
+
+
+def id_of(name: str) -> str:
+    """The id of an example."""
+    return f"examples/{name.capitalize()}-v0"
 
 
 def judged(task: BenchmarkTask, policy: Any) -> Ends:
@@ -99,10 +102,7 @@ def rewards(sailed: Rollout, ends: Any) -> Floats:
 
 def learned(task: BenchmarkTask, steps: int) -> Any:
     """An agent of stable-baselines3."""
-    env_id = f"examples/{task.name}-v0"
-    options = {"model": task.model, **task.options}
-    shipgym.register_task(env_id, task.environment, **options)
-    ships = shipgym.ShipVecEnv(env_id, num_envs=32, seed=0)
+    ships = shipgym.ShipVecEnv(id_of(task.name), num_envs=32, seed=0)
     batch = 256 if task.name == "encounter" else 64
     agent = PPO("MlpPolicy", ships, n_steps=256, batch_size=batch, seed=0)
     return agent.learn(steps)
@@ -113,7 +113,7 @@ class Rule:
 
     def __init__(self, task: BenchmarkTask) -> None:
         self.task = task
-        self.file = runpy.run_path(str(EXAMPLES / f"{task.name}_rule.py"))
+        self.file = runpy.run_path(str(FOLDER / f"{task.name}_rule.py"))
         self.numbers: dict[str, float] = self.file["NUMBERS"]
         self.engines: dict[int, Any] = {}
 

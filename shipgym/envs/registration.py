@@ -7,6 +7,7 @@ import gymnasium
 
 from shipgym.checks import check_text
 from shipgym.errors import InputError
+from shipgym.python_files import load_file
 
 ENTRY_POINT = "shipgym.envs.ship_env:ShipEnv"  # of every environment
 #: Keywords of each environment by its id.
@@ -112,6 +113,12 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
             f"env_id: expected an id such as 'harbour/{asked.name}-v0', got {env_id!r}:"
             f" {error}"
         ) from None
+
+
+def register_file(env_id: str, path: Path) -> None:
+    """Register a task whose file names its keywords in `OPTIONS`, untried."""
+    options = vars(load_file(path))["OPTIONS"]
+    _register(env_id, {"task": str(path), **options})
 
 
 def registered() -> dict[str, dict[str, Any]]:

@@ -1,8 +1,16 @@
-"""Ship files with recorded trials that come with the package, to try it out."""
+"""What comes with the package to try it out: a ship's trials, and tasks to copy.
+
+Importing it registers the tasks, `"shipgym.examples:examples/Berth-v0"` for example.
+Files that end in `_rule` hold a rule that steers a task.
+"""
 
 from pathlib import Path
 
 from shipgym.checks import check_choice
+from shipgym.envs.registration import register_file
+
+FOLDER = Path(__file__).parent
+TASKS = ("berth", "encounter", "fairway", "river")
 
 
 def example_ship(name: str = "mariner") -> Path:
@@ -17,6 +25,9 @@ def example_ship(name: str = "mariner") -> Path:
         The ship: "mariner" is a cargo ship of the Mariner class with three simulated
         zigzags as a sea trial would log them, two to fit and one to validate.
     """
-    folder = Path(__file__).parent
-    known = sorted(path.parent.name for path in folder.glob("*/ship.toml"))
-    return folder / check_choice(name, known, "example ship") / "ship.toml"
+    known = sorted(path.parent.name for path in FOLDER.glob("*/ship.toml"))
+    return FOLDER / check_choice(name, known, "example ship") / "ship.toml"
+
+
+for task in TASKS:
+    register_file(f"examples/{task.capitalize()}-v0", FOLDER / f"{task}.py")

@@ -9,7 +9,7 @@ import pytest
 from agents.rollouts.rollout import rollout
 from agents.suites.suite import BenchmarkTask
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+EXAMPLES = Path(__file__).parents[2] / "shipgym" / "examples"
 BERTH = {"action": "rudder-shaft", "dt": 10.0}
 
 

@@ -18,7 +18,8 @@ from shipgym.tasks.task import Task
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "task_of_your_own.md").read_text(encoding="utf-8")
-FAIRWAY = (ROOT / "examples" / "fairway.py").read_text(encoding="utf-8")
+EXAMPLE = ROOT / "shipgym" / "examples" / "fairway.py"
+FAIRWAY = EXAMPLE.read_text(encoding="utf-8")
 REWARD, SENSORS = (
     re.search(rf'```python\n("""{name}.*?)```', PAGE, re.DOTALL)[1]  # type: ignore[index]
     for name in ("my_reward", "my_sensors")
@@ -47,7 +48,7 @@ def fairway(tmp_path):
 def test_the_example_is_a_task_of_one_screen_and_sound():
     assert FAIRWAY.count("\n") < 120
     assert f"```python\n{FAIRWAY}```" in PAGE
-    assert str(check_task(ROOT / "examples" / "fairway.py", **SHIP)) == "fairway: sound"
+    assert str(check_task(EXAMPLE, **SHIP)) == "fairway: sound"
 
 
 def test_a_task_works_everywhere(fairway):

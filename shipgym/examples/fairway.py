@@ -101,14 +101,14 @@ def observe(readings, state, interval, ship, settings):
     )
 
 
+OPTIONS = {"model": "kvlcc2", "action": "rudder-shaft"}
+
 if __name__ == "__main__":
     from stable_baselines3 import PPO
 
     import shipgym
 
-    shipgym.register_task(
-        "harbour/Fairway-v0", __file__, model="kvlcc2", action="rudder-shaft"
-    )
-    print(shipgym.check_task(__file__, model="kvlcc2", action="rudder-shaft"))
+    shipgym.register_task("harbour/Fairway-v0", __file__, **OPTIONS)
+    print(shipgym.check_task(__file__, **OPTIONS))
     ships = shipgym.ShipVecEnv("harbour/Fairway-v0", num_envs=64)
     PPO("MlpPolicy", ships, n_steps=256, verbose=1).learn(500_000)

@@ -108,12 +108,14 @@ def draw(motion, state, ship, settings):
     return shapes
 
 
+OPTIONS = {"dt": 5.0}
+
 if __name__ == "__main__":
     from stable_baselines3 import PPO
 
     import shipgym
 
-    shipgym.register_task("harbour/Encounter-v0", __file__, dt=5.0)
-    print(shipgym.check_task(__file__, dt=5.0))
+    print(shipgym.check_task(__file__, **OPTIONS))
+    shipgym.register_task("harbour/Encounter-v0", __file__, **OPTIONS)
     ships = shipgym.ShipVecEnv("harbour/Encounter-v0", num_envs=32)
     PPO("MlpPolicy", ships, n_steps=256, verbose=1).learn(500_000)
