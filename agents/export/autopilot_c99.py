@@ -32,9 +32,10 @@ from agents.export.c_structures import (
 from agents.export.c_syntax import Kind, comment
 from agents.export.source import Source, c_source, checked_name, hash_text, render
 from agents.export.translator import Translator
-from agents.policies.policy import ORDERS, LearnedPolicy, combined, toward
+from agents.policies.policy import ORDERS, LearnedPolicy, combined
 from shipgym import InputError
 from shipgym.checks import quoted
+from shipgym.envs.pace import toward
 
 
 def autopilot_source(agent: Any, name: str | None = None) -> Source:

@@ -34,13 +34,13 @@ from agents.policies.policy_extraction import sb3_fields, task_showing
 from agents.policies.weights_file import Tensors, as_json, write_policy
 from shipgym import InputError, ShipModel
 from shipgym.checks import check_choice, check_number, check_whole
+from shipgym.envs.pace import NO_LIMIT, toward
 from shipgym.tasks.definition import read_definition
 from shipgym.tasks.task import ACTIONS, RUDDER_ORDERS, Task
 
 ORDERS = np.array(RUDDER_ORDERS, dtype=np.float32)
 #: Number of the network's outputs by the kind of action.
 OUTPUTS = {"rudder": 1, "rudder-discrete": len(RUDDER_ORDERS), "rudder-shaft": 2}
-NO_LIMIT = 2.0  # of the rate: outputs are in [-1, 1]
 
 
 class PolicyMemory(NamedTuple):
@@ -374,12 +374,6 @@ def check_part(agent: Any) -> None:
             f"authority: expected 1 without a base, got {agent.authority:g}; give a"
             " base to which the agent adds"
         )
-
-
-def toward(outputs: Any, before: Any, rate_limit: float) -> Any:
-    """Outputs limited to [-1, 1], and to a change of `rate_limit` from those before."""
-    within = np.clip(outputs, -1.0, 1.0)
-    return np.clip(within, before - rate_limit, before + rate_limit)
 
 
 def combined(proposed: Any, part: Any, authority: float) -> Any:

@@ -18,6 +18,8 @@ from agents.controllers.interface import model_hash
 from agents.policies.network import Layer, Network
 from agents.policies.weights_file import as_json
 from shipgym import InputError
+from shipgym.envs.environment import PACE
+from shipgym.envs.pace import NO_LIMIT, Pace
 from shipgym.envs.registration import env_id
 from shipgym.tasks.definition import TASKS
 
@@ -63,7 +65,7 @@ def sb3_fields(agent: Any, env: Any = None) -> dict[str, Any]:
     return {
         "network": network,
         **learned_in,
-        **_residual(stack),
+        **(_residual(stack) or _paced(stack[-1].pace, learned_in["action"])),
     }
 
 
@@ -119,6 +121,27 @@ def _residual(stack: Sequence[Any]) -> dict[str, Any]:
     return {}
 
 
+def _paced(pace: Pace, action: str) -> dict[str, Any]:
+    """Settings of a policy that learned among ships of a pace."""
+    limit = pace.rate_limit
+    if pace.frame_stack > 1 and pace.action_repeat > 1:
+        raise InputError(
+            "env: a learned policy stacks the observations of control intervals:"
+            f" expected frame_stack or action_repeat, got both, {pace}; learn among the"
+            " ships of ResidualVecEnv, which takes both"
+        )
+    if limit is not None and "shaft" in action:
+        raise InputError(
+            f"env: expected no rate_limit with action {action!r}, got {limit:g}: a"
+            " learned policy limits the rudder's rate alone"
+        )
+    return {
+        "frame_stack": pace.frame_stack,
+        "action_repeat": pace.action_repeat,
+        "rate_limit": NO_LIMIT if limit is None else min(float(limit), NO_LIMIT),
+    }
+
+
 def _environment(ships: Any) -> dict[str, Any]:
     """Observations, action and environment of a policy, by keyword."""
     if not hasattr(ships, "observation_names"):
@@ -154,6 +177,7 @@ def _options(keywords: Mapping[str, Any]) -> dict[str, Any]:
         "autoreset_mode",
         "vectorization_mode",
         "render_mode",
+        *PACE,  # the policy's own
     )
     for name, value in keywords.items():
         is_of_package = name == "task" and value in TASKS
@@ -228,17 +252,18 @@ def _check_extraction(network: Network, agent: Any, action: str) -> None:
     """Refuse a network that differs from its agent at random observations."""
     n_inputs, *_ = network.sizes
     shape = agent.observation_space.shape
-    if shape != (n_inputs,):
+    if np.prod(shape) != n_inputs:
         raise InputError(
-            f"agent: expected observations of shape {(n_inputs,)}, as its network has"
-            f" inputs, got {shape}"
+            f"agent: expected {n_inputs} observations, as its network has inputs, got"
+            f" those of shape {shape}"
         )
 
     random = np.random.default_rng(0)
     n_compared = 16
     uniform = random.uniform(-1.0, 1.0, (n_compared, n_inputs))
     inputs = uniform.astype(np.float32)
-    commands, _ = agent.predict(inputs, deterministic=True)
+    shown = inputs.reshape(n_compared, *shape)
+    commands, _ = agent.predict(shown, deterministic=True)
     output = network(inputs)
     agreement = 1e-5  # of the commands found with torch and without, above rounding
     if action == "rudder-discrete":

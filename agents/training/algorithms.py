@@ -13,7 +13,6 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from agents.agent_file import load_agent
 from agents.controllers.controller import Controller
 from agents.controllers.designs import design, tuned
-from agents.policies.policy import NO_LIMIT
 from agents.suites.suite import BenchmarkTask
 from agents.training.plan import TrainingPlan, training_options
 from agents.training.residual import ResidualVecEnv
@@ -25,6 +24,7 @@ from agents.training.settings import (
     TD3Settings,
     TQCSettings,
 )
+from shipgym.envs.pace import NO_LIMIT
 from shipgym.envs.sb3 import ShipVecEnv
 from shipgym.errors import InputError
 from shipgym.extras import library

@@ -8,8 +8,9 @@ from gymnasium import spaces
 
 from agents.controllers.interface import Policy
 from agents.policies.network import Numbers
-from agents.policies.policy import NO_LIMIT, check_part, toward
+from agents.policies.policy import check_part
 from shipgym.arrays import Flags, Integers
+from shipgym.envs.pace import NO_LIMIT, Pace, toward
 from shipgym.errors import InputError
 from shipgym.extras import library
 
@@ -28,7 +29,8 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
     base alone (without base: the output).
 
     Raises InputError for commands that are not continuous together with a base, a base
-    that does not fit the ship, or a value out of its range.
+    that does not fit the ship, ships with an action repeat, rate limit or frame stack
+    of their own, or a value out of its range.
 
     Parameters
     ----------
@@ -55,6 +57,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         self.action_repeat = action_repeat
         self.rate_limit = rate_limit
         check_part(self)
+        _check_pace(venv)
         space = _stacked_space(venv, frame_stack, base)
         super().__init__(venv, observation_space=space)
 
@@ -158,6 +161,17 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         )
         self._proposed = np.asarray(proposed, dtype=np.float32)
         return np.concatenate([histories, self._proposed], axis=1)
+
+
+def _check_pace(venv: Any) -> None:
+    """Refuse ships that take more than one control interval in a step."""
+    if venv.has_attr("pace"):
+        pace = venv.get_attr("pace", 0)[0]
+        if isinstance(pace, Pace) and pace != Pace():
+            raise InputError(
+                f"venv: expected steps of one control interval, got {pace}; give"
+                " action_repeat, rate_limit and frame_stack to ResidualVecEnv instead"
+            )
 
 
 def _stacked_space(venv: Any, frame_stack: int, base: Policy | None) -> spaces.Box:

@@ -22,6 +22,7 @@ from shipgym.checks import (
     unexpected,
 )
 from shipgym.envs.engine import Engine, as_array, episode_key
+from shipgym.envs.pace import Frames, Pace, PacedSteps
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
 from shipgym.instruments.sensor_set import read_sensors
@@ -37,6 +38,7 @@ Space = (
 )
 DEFAULT_MODEL = "mariner-tls-svm"
 DEFAULT_TASK = "CourseKeeping"
+PACE = ("action_repeat", "rate_limit", "frame_stack")  # keywords that make a `Pace`
 
 
 class UnknownKeywordError(InputError, TypeError):
@@ -86,14 +88,15 @@ def read_options(
     return ship, Task.of(definition, **rest), randomisation
 
 
-def spaces(task: Task, model: ShipModel) -> tuple[Any, Space]:
+def spaces(task: Task, model: ShipModel, frame_stack: int = 1) -> tuple[Any, Space]:
     """Observation and action space of a task for a ship."""
     observed = task.observed(model)
-    observations = gymnasium.spaces.Box(
-        low=np.array([quantity.low for quantity in observed], dtype=np.float32),
-        high=np.array([quantity.high for quantity in observed], dtype=np.float32),
-        dtype=np.float32,
-    )
+    low = np.array([quantity.low for quantity in observed], dtype=np.float32)
+    high = np.array([quantity.high for quantity in observed], dtype=np.float32)
+    if frame_stack > 1:
+        low = np.tile(low, (frame_stack, 1))
+        high = np.tile(high, (frame_stack, 1))
+    observations = gymnasium.spaces.Box(low, high, dtype=np.float32)
     counts = [len(orders) for orders in task.orders(model)]
     if len(counts) == 1:
         return observations, gymnasium.spaces.Discrete(counts[0])
@@ -132,6 +135,8 @@ class ShipsEnv:
     ----------
     model : ShipModel
     task : Task
+    pace : Pace
+        Its keywords `action_repeat`, `rate_limit` and `frame_stack`.
     observation_names : tuple of str
     observation_scales : array of shape (n_observations,)
         Physical value of an observation of 1, SI units.
@@ -166,6 +171,7 @@ class ShipsEnv:
         self.model, self.task, randomisation = read_options(
             given["task"], given["model"], options, taken
         )
+        self.pace = Pace(*(given[name] for name in PACE))
         num_envs = given.get("num_envs", 1)
         self._own_engine = Engine(
             self.model,
@@ -186,10 +192,14 @@ class ShipsEnv:
         self._orders: list[NDArray[np.float32]] = []
         for orders in self.task.orders(self.model):
             self._orders.append(np.array(orders, dtype=np.float32))
+        self.pace.check_reaches(self._orders)
+        self._frames: Frames | None = None
+        if self.pace.frame_stack > 1:
+            self._frames = Frames(num_envs, self.pace.frame_stack, len(observed))
         self._begun = False  # and not closed since
         self._keys: NDArray[np.uint64] | None = None  # of each row's episodes
         self._use(self._own_engine)
-        return spaces(self.task, self.model)
+        return spaces(self.task, self.model, self.pace.frame_stack)
 
     @property
     def corridor(self) -> float | None:
@@ -207,6 +217,24 @@ class ShipsEnv:
 
     def _use(self, engine: Engine) -> None:
         self._engine = engine
+        self._paced: PacedSteps | None = None
+        if self.pace.action_repeat > 1 or self.pace.rate_limit is not None:
+            self._paced = PacedSteps(engine, self.pace)
+
+    def _shown(self, begun: Flags | None = None) -> NDArray[np.float32]:
+        """Observations of the engine, or the frames that end with them.
+
+        `begun`: rows that have begun an episode, without a step of the others.
+        """
+        observations = self._engine.outputs.observations
+        if self._frames is None:
+            return observations
+        if begun is None:
+            self._frames.add(observations)
+            begun = self._engine.steps == 0.0
+        if begun.any():
+            self._frames.begin(observations, begun)
+        return self._frames.shown
 
     @property
     def spec(self) -> EnvSpec | None:
@@ -215,12 +243,13 @@ class ShipsEnv:
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = spec and replace(spec, max_episode_steps=self.task.episode_steps)
+        steps = -(-self.task.episode_steps // self.pace.action_repeat)
+        self._spec = spec and replace(spec, max_episode_steps=steps)
 
     @property
     def dt(self) -> float:
-        """Control interval, s."""
-        return self._engine.dt
+        """Time of a step, s: the control interval, times `action_repeat`."""
+        return self.pace.action_repeat * self._engine.dt
 
     def __reduce__(self) -> Any:
         attributes = {}
@@ -237,8 +266,11 @@ class ShipsEnv:
         return rebuild(kind, arguments, state, copy.deepcopy(attributes, memo))
 
     def _counters(self) -> dict[str, Any]:
-        """Integers that a copy has in addition to the engine's."""
-        return {"row_keys": np.array(self._keys)}
+        """Numbers that a copy has in addition to the engine's."""
+        counters = {"row_keys": np.array(self._keys)}
+        if self._frames is not None:
+            counters["frames"] = self._frames.shown
+        return counters
 
     def _state(self) -> dict[str, Any]:
         """Episodes, their random numbers and the outputs of the last step."""
@@ -260,8 +292,10 @@ class ShipsEnv:
             artist.begin(engine)
 
     def _recall(self, counters: Mapping[str, Any]) -> None:
-        """Restore the integers of `_counters`."""
+        """Restore the numbers of `_counters`."""
         self._keys = counters["row_keys"].copy()
+        if self._frames is not None:
+            self._frames.shown = counters["frames"].copy()
 
     def _engine_for(self, asked: Mapping[str, Any]) -> Engine:
         """Return the engine, or one with other settings or a certain ship."""

@@ -36,6 +36,7 @@ SHARED = (
     "model",
     "observation_names",
     "observation_scales",
+    "pace",
     "render_mode",
     "spec",
     "task",

@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.checks import unexpected
 from shipgym.engine.episodes import REFUSED
 from shipgym.envs.engine import Engine, as_numbers
@@ -51,6 +51,17 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         Render mode of Gymnasium.
     allow_unstable : bool
         Whether a model that was found unstable when it was identified may be used.
+    action_repeat : int
+        Control intervals for which an action is held. Reward, cost and parts of a step
+        are their sums; an episode may end inside a step.
+    rate_limit : float, optional
+        Largest change of a command in a control interval, parts of its limit as the
+        action: in rad/s of rudder it is `rate_limit * rudder_limit / dt`.
+    frame_stack : int
+        Number of observations shown together, oldest first, shape (frame_stack,
+        n_observations) as Gymnasium's FrameStackObservation has it; the "MlpPolicy" of
+        stable-baselines3 takes it. An episode begins with its first observation in
+        each.
     **options
         Settings of the task, fields of `Task` and of `Randomisation`; `reward` and
         `sensors`, files with a reward and a sensor set of your own
@@ -68,6 +79,9 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         task: Any = DEFAULT_TASK,
         render_mode: str | None = None,
         allow_unstable: bool = False,
+        action_repeat: int = 1,
+        rate_limit: float | None = None,
+        frame_stack: int = 1,
         **options: Any,
     ) -> None:
         arguments = locals()
@@ -96,6 +110,8 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         self._command = engine.command[:, 0]
         self._shape = self._command.shape
         self._advance = engine.step_of_one()
+        if self._paced is not None:
+            self._advance = self._paced.step_of_one
 
     @property
     def waypoints(self) -> Floats | None:
@@ -139,7 +155,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         self._engine.begin(self._keys, episodes)
         self._draw_and_show()
         numbers = self._outcomes[ANSWER_OUTCOMES:].tolist()
-        return self._observation.copy(), self._info(numbers)
+        return self._seen(self._engine.all_lanes), self._info(numbers)
 
     def step(
         self, action: Any
@@ -180,12 +196,22 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         info = self._info(numbers)
         if self._artists:
             self._draw_and_show()
+        seen = self._seen()
         if self._over:
             self._warn_of_the_end()
             terminated, truncated = self._end
         elif terminated or truncated:
             self._note_end((terminated, truncated))
-        return self._observation.copy(), reward, terminated > 0.0, truncated > 0.0, info
+        return seen, reward, terminated > 0.0, truncated > 0.0, info
+
+    def _seen(self, begun: Flags | None = None) -> Observation:
+        """Return a copy of what the agent sees."""
+        seen: Observation = self._observation
+        if self._frames is not None:
+            # nothing changes behind the end of an episode
+            shown = self._frames.shown if self._over else self._shown(begun)
+            seen = shown[0]
+        return seen.copy()
 
     def _note_end(self, end: Any = (0.0, 0.0)) -> None:
         """Note how an episode ended, terminated or truncated; neither: it goes on."""
@@ -223,9 +249,12 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             action = as_numbers(action, "action")
         if action.shape != self._shape:
             commands = "a number for each command"
+            hint = ""
+            if self._frames is not None:
+                hint = "; shipgym's controllers steer by one observation: show the last"
             raise InputError(
                 f"action: expected shape {self._shape}, {commands}, got shape"
-                f" {action.shape}"
+                f" {action.shape}{hint}"
             )
         self._command[...] = action
 

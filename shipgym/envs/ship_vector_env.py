@@ -49,7 +49,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         When the next episode of a row begins.
     threads : int
         Number of threads that share the rows; the results do not depend on it.
-    **options
+    action_repeat, rate_limit, frame_stack, **options
         As for the single environment.
     """
 
@@ -62,6 +62,9 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         allow_unstable: bool = False,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int = 1,
+        action_repeat: int = 1,
+        rate_limit: float | None = None,
+        frame_stack: int = 1,
         **options: Any,
     ) -> None:
         arguments = locals()
@@ -147,7 +150,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         infos = self._infos()
         for name in self._masks:
             infos[name] = mask.copy()
-        return engine.outputs.observations, infos
+        return self._shown(mask), infos
 
     def _next_episodes(
         self,
@@ -233,23 +236,27 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             actions = given_orders(self._orders, actions, self.action_space, "actions")
         engine = self._engine
         engine.order(actions)
-        n_ended = engine.advance(self._some_over, anew=True)
+        paced = engine if self._paced is None else self._paced
+        n_ended = paced.advance(self._some_over, anew=True)
         outputs = engine.outputs
         rewards = outputs.outcomes[0]
         if self._own_reward and not isfinite(rewards.sum()):
             engine.refuse_rewards()
 
+        observations = self._shown()
         infos = self._infos()
         if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             self._some_over = n_ended > 0
         elif n_ended and self.autoreset_mode is AutoresetMode.SAME_STEP:
-            infos |= self._final()
-            engine.begin_next(outputs.terminated | outputs.truncated)
+            ended = outputs.terminated | outputs.truncated
+            infos |= self._final(observations, ended)
+            engine.begin_next(ended)
+            observations = self._shown(ended)
         elif self._keeps_ends and n_ended:
             self._over = outputs.terminated | outputs.truncated
         self._draw()
         return (
-            outputs.observations,
+            observations,
             rewards,
             outputs.terminated,
             outputs.truncated,
@@ -264,13 +271,12 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             " reset them (options: reset_mask), or choose another autoreset_mode"
         )
 
-    def _final(self) -> Infos:
+    def _final(self, observations: Observation, ended: Flags) -> Infos:
         """Last observations and infos of episodes that ended."""
         outputs = self._engine.outputs
-        ended = outputs.terminated | outputs.truncated
         final_obs = np.full(self.num_envs, None, dtype=object)
         for row in np.flatnonzero(ended).tolist():
-            final_obs[row] = outputs.observations[row].copy()
+            final_obs[row] = observations[row].copy()
 
         # zero in the rows that go on, as in Gymnasium's vector environments
         outcomes = np.where(ended, outputs.outcomes, 0.0)

@@ -22,7 +22,16 @@ from shipgym.tasks.scales import control_interval
 Sea = str | Weather
 
 #: Keywords of environments of one ship, and of many.
-ENV_OPTIONS = ("model", "task", "reward", "render_mode", "allow_unstable")
+ENV_OPTIONS = (
+    "model",
+    "task",
+    "reward",
+    "render_mode",
+    "allow_unstable",
+    "action_repeat",
+    "rate_limit",
+    "frame_stack",
+)
 VECTOR_OPTIONS = (
     "num_envs",
     *ENV_OPTIONS,

@@ -110,6 +110,23 @@ def test_what_it_learned_in_is_recorded():
     policy.check_fits_model(MARINER)
 
 
+@pytest.mark.parametrize("pace", [{"frame_stack": 3}, {"action_repeat": 4}])
+def test_the_pace_of_the_ships_is_the_policys_own(pace):
+    pace = {**pace, "rate_limit": 0.1}
+    env = ships(**pace)
+    agent = strong(PPO("MlpPolicy", env, n_steps=8, batch_size=32))
+    policy, plain = LearnedPolicy.from_sb3(agent), ships()
+    assert policy.env_options == {}
+    seen, shown, state = env.reset(), plain.reset(), None
+    for _ in range(10):
+        seen, *_ = env.step(agent.predict(seen, deterministic=True)[0])
+        for _ in range(pace.get("action_repeat", 1)):
+            action, state = policy.predict(shown, state)
+            shown, *_ = plain.step(action)
+    newest = seen.reshape(4, -1, 8)[:, -1]
+    np.testing.assert_allclose(newest, shown, atol=1e-5)
+
+
 class Doubled(BaseFeaturesExtractor):
     def __init__(self, space):
         super().__init__(space, space.shape[0])
@@ -157,6 +174,14 @@ REFUSED = {
     "algorithm": (
         made(DQN, discrete_ships, buffer_size=10),
         "agent: expected PPO, .* got DQN with DQNPolicy",
+    ),
+    "pace": (
+        made(env=lambda: ships(frame_stack=2, action_repeat=2)),
+        "env: .* expected frame_stack or action_repeat, got both",
+    ),
+    "two paces": (
+        made(env=lambda: ResidualVecEnv(ships(action_repeat=2))),
+        "venv: expected steps of one control interval, got Pace.action_repeat=2",
     ),
     "scaled": (
         made(env=lambda: VecNormalize(ships())),

@@ -172,6 +172,13 @@ def test_a_step_before_the_reset_or_after_the_end_is_refused(name):
             "action: .*'mariner', got 'rudder-shaft'",
         ),
         ({"noise": -0.1}, "noise: expected"),
+        ({"action_repeat": 0}, "action_repeat: expected an integer .* got 0"),
+        ({"frame_stack": 1.5}, "frame_stack: expected an integer .* got 1.5"),
+        ({"rate_limit": 0.0}, "rate_limit: expected a number > 0"),
+        (
+            {"rate_limit": 0.1, "action_repeat": 2, "action": "rudder-discrete"},
+            "rate_limit: expected at least 0.25 with discrete orders .* reaches 0.2",
+        ),
         ({"roll": True}, "roll: .*'mariner', which does not roll"),
         (
             {"envelope_weight": "much"},

@@ -9,6 +9,7 @@ import document_settings
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.wrappers import FrameStackObservation
 
 import shipgym
 from shipgym import InputError
@@ -183,6 +184,41 @@ def test_a_tanker_goes_astern():
         env.step(np.array([0.0, -1.0], dtype=np.float32))
     assert env.physical_state()["n"] < 0.0
     assert env.physical_state()["u"] < 0.6 * env.model.particulars["speed"]
+
+
+@pytest.mark.parametrize("repeat", [1, 4])
+def test_a_step_holds_its_command_and_moves_it_at_a_limited_rate(repeat):
+    rate = 0.07
+    paced, plain = make(action_repeat=repeat, rate_limit=rate), make()
+    assert paced.dt == repeat * plain.dt
+    for env in (paced, plain):
+        env.reset(seed=2)
+    paced.action_space.seed(1)
+    held, over = np.zeros(1, dtype=np.float32), False
+    while not over:
+        action = paced.action_space.sample()
+        seen, reward, *ends, info = paced.step(action)
+        rewards = costs = 0.0
+        for _ in range(repeat):
+            held = np.clip(action, held - rate, held + rate)
+            expected, part, *expected_ends, last = plain.step(held)
+            rewards, costs = rewards + part, costs + last["cost"]
+            if any(expected_ends):
+                break
+        np.testing.assert_array_equal(seen, expected)
+        assert (reward, info["cost"]) == pytest.approx((rewards, costs), rel=1e-12)
+        assert info["heading_error"] == last["heading_error"]
+        assert ends == expected_ends
+        over = any(ends)
+
+
+def test_frames_are_those_of_gymnasiums_wrapper():
+    ours, theirs = make(frame_stack=4), FrameStackObservation(make(), 4)
+    assert ours.observation_space == theirs.observation_space
+    np.testing.assert_array_equal(ours.reset(seed=1)[0], theirs.reset(seed=1)[0])
+    for _ in range(6):
+        action = ours.action_space.sample()
+        np.testing.assert_array_equal(ours.step(action)[0], theirs.step(action)[0])
 
 
 def test_discrete_orders_are_the_continuous_ones():

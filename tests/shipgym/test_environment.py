@@ -67,6 +67,8 @@ def same(first, second):
     [
         (one, {"episode_steps": 20}),
         (many, {"episode_steps": 20}),
+        (one, {"episode_steps": 20, "frame_stack": 3, "rate_limit": 0.1}),
+        (many, {"episode_steps": 50, "frame_stack": 2, "action_repeat": 3}),
         (partial(many, COURSE), {**SEA, "autoreset_mode": "SameStep"}),
     ],
 )

@@ -13,6 +13,7 @@ from shipgym.envs.checker import check_vector_env
 
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
 SHORT = {"episode_steps": 23}
+PACED = {"action_repeat": 3, "rate_limit": 0.1, "frame_stack": 2}
 MODES = tuple(AutoresetMode)
 
 
@@ -50,6 +51,7 @@ def test_conformance_and_rows_that_are_single_environments(name, mode):
             },
         ),
         (PATH, {"model": "kvlcc2", "action": "rudder-shaft"}),
+        *((COURSE, {**PACED, "autoreset_mode": mode}) for mode in MODES),
         (
             COURSE,
             {"model": "container", "roll": True, "roll_weight": 1.0, "sea": "moderate"},
@@ -58,11 +60,12 @@ def test_conformance_and_rows_that_are_single_environments(name, mode):
 )
 def test_rows_are_single_environments_with_every_option(name, options):
     options = {"model": "mariner", **SHORT, **options}
+    single = {key: one for key, one in options.items() if key != "autoreset_mode"}
     check_vector_env(
         lambda: gymnasium.make_vec(
             name, num_envs=66 if "sea" in options else 3, **options
         ),
-        lambda: gymnasium.make(name, **options),
+        lambda: gymnasium.make(name, **single),
         n_steps=30,
     )
 
