@@ -98,8 +98,6 @@ def steady_sea(given: ShipInput) -> Sea:
         roll_velocity=0.0,
         psi_wave=0.0,
         r_wave=0.0,
-        phi_wave=0.0,
-        p_wave=0.0,
     )
 
 

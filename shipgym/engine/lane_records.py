@@ -89,8 +89,6 @@ class SeaChannels(NamedTuple):
 
     psi_wave: float  # rad, first-order motion in heading
     r_wave: float  # rad/s, in yaw rate
-    phi_wave: float  # rad, in heel
-    p_wave: float  # rad/s, in roll rate
     current_north: float  # m/s
     current_east: float  # m/s
     wind_speed: float  # m/s

@@ -138,8 +138,6 @@ def record_sea(out: Any, row: int, sea: Any, parameters: Any) -> None:
     channels = SeaChannels(
         psi_wave=now.psi_wave,
         r_wave=now.r_wave,
-        phi_wave=now.phi_wave,
-        p_wave=now.p_wave,
         current_north=now.current_north,
         current_east=now.current_east,
         wind_speed=p.wind_speed + now.gust,

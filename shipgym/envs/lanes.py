@@ -232,10 +232,7 @@ class Lanes:
 
     def _weather_now(self) -> dict[str, Floats]:
         """Weather of each lane, by the names of the channels of trials."""
-        names = ["psi_wave", "r_wave"]
-        if "phi" in self.model.state_names:
-            names += ["phi_wave", "p_wave"]
-        names += ["current_north", "current_east"]
+        names = ["psi_wave", "r_wave", "current_north", "current_east"]
         weather = {name: self.read(name) for name in names}
 
         mean_speed = self._ship_number("wind_speed")

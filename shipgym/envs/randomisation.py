@@ -28,6 +28,8 @@ class Randomisation:
     # {None, "covariance"}; whether each episode's ship is drawn from the identified
     # covariance ("posterior" is taken too)
     model_uncertainty: str | None = None
+    # least and largest rate of the steering gear, deg/s
+    rudder_rate_range: Range | None = None
     # further models of the same structure, of which each episode has one
     ensemble: Sequence[str | Path | ShipModel] = ()
     # least and largest approach speed, parts of the service speed; the shaft turns in
@@ -47,6 +49,8 @@ class Randomisation:
             _check_range(self.speed_range, "speed_range")
         if self.loading_range is not None:
             _check_range(self.loading_range, "loading_range")
+        if self.rudder_rate_range is not None:
+            _check_range(self.rudder_rate_range, "rudder_rate_range")
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
@@ -73,8 +77,8 @@ class Randomisation:
         models = [model]
         if self.ensemble:
             models += self._others(model)
-        ships_differ = self.model_uncertainty or self.speed_range or self.loading_range
-        if ships_differ:
+        ranges = (self.speed_range, self.loading_range, self.rudder_rate_range)
+        if self.model_uncertainty or any(ranges):
             return self._drawn(models, seas)
         return list(product(models, seas))
 
@@ -133,7 +137,7 @@ class Randomisation:
         paces: dict[int, list[Particulars]],
         random: np.random.Generator,
     ) -> ShipModel:
-        """Ship at a speed and of a loading within the ranges."""
+        """Ship at a speed, of a loading and with a gear within the ranges."""
         if self.loading_range:
             ship = _loaded(ship, random.uniform(*self.loading_range))
         if self.speed_range:
@@ -145,6 +149,10 @@ class Randomisation:
                 particulars=pace,
                 service_shaft_speed=part * ship.service_shaft_speed,
             )
+        if self.rudder_rate_range:
+            rate = random.uniform(*self.rudder_rate_range)
+            gear = replace(ship.steering, rudder_rate_deg_s=rate)
+            ship = replace(ship, steering=gear)
         return ship
 
 

@@ -10,6 +10,18 @@ from shipgym.errors import InputError
 from shipgym.python_files import load_file
 
 ENTRY_POINT = "shipgym.envs.ship_env:ShipEnv"  # of every environment
+#: Waves of sea states 4 and 5 from abeam to the quarter, by height and period.
+ROLLING_SEAS = [
+    {
+        "waves": {
+            "significant_height": height,
+            "peak_period": period,
+            "from_deg": from_deg,
+        }
+    }
+    for height, period in ((1.9, 8.8), (2.6, 9.2))
+    for from_deg in (-125.0, -110.0, -95.0, -80.0, 80.0, 95.0, 110.0, 125.0)
+]
 #: Keywords of each environment by its id.
 ENVIRONMENTS: dict[str, dict[str, Any]] = {
     "shipgym/CourseKeeping-v0": {"task": "CourseKeeping"},
@@ -22,11 +34,22 @@ ENVIRONMENTS: dict[str, dict[str, Any]] = {
         "action": "rudder-shaft",
         "model": "kvlcc2-mmg",
     },
-    "shipgym/CourseKeepingRoll-v0": {
+    "shipgym/RudderRoll-v0": {
         "task": "CourseKeeping",
+        "model": "container-stiff",
         "roll": True,
+        "sea": ROLLING_SEAS,
+        "rudder_rate_range": (2.5, 5.0),
+        "first_course_deg": 5.0,
+        "course_change_deg": 0.0,
+        "heading_scale_deg": 5.0,
+        "rudder_weight": 0.01,
+        "rudder_rate_weight": 0.0005,
         "roll_weight": 1.0,
-        "model": "container-4dof-output-error",
+        "roll_scale_deg": 5.0,
+        "roll_free_deg": 3.0,
+        "speed_weight": 1.0,
+        "bounded": 2.0,
     },
     "shipgym/PathFollowing-v0": {
         "task": "PathFollowing",

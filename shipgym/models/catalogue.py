@@ -65,6 +65,26 @@ def container() -> ShipModel:
     return model_of(get_equations("container"))
 
 
+def container_stiff() -> ShipModel:
+    """S175 with a metacentric height of 2.5 m, at the 22 knots that she is built for.
+
+    She rolls with a period of 10.4 s; the published ship, with 0.3 m, takes 33 s.
+    """
+    ship = container()
+    GM = 2.5  # m
+    speed = 22.0 * 1852.0 / 3600.0  # m/s
+    pace = speed / ship.particulars["speed"]
+    return replace(
+        ship,
+        name="container-stiff",
+        particulars=replace(
+            ship.particulars, speed=speed, metacentric_height=GM, roll_period=10.4
+        ),
+        coefficients={**ship.coefficients, "GM": GM},
+        service_shaft_speed=pace * ship.service_shaft_speed,
+    )
+
+
 def tanker() -> ShipModel:
     """Esso 190 000 dwt tanker, deep and shallow water."""
     return model_of(get_equations("tanker"))
@@ -94,6 +114,7 @@ def kvlcc2_l7() -> ShipModel:
 REFERENCE_SHIPS: dict[str, Callable[[], ShipModel]] = {
     "mariner": mariner,
     "container": container,
+    "container-stiff": container_stiff,
     "tanker": tanker,
     "kvlcc2": kvlcc2,
     "kvlcc2-l7": kvlcc2_l7,

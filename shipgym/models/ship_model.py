@@ -91,10 +91,10 @@ class ShipModel(ManoeuvringModel):
         -------
         Trial
             n_steps + 1 samples with the state and the commands (`delta_command`). In
-            weather x and y are over ground, u and v through the water; psi, r, p and
-            phi are without the first-order motion in waves, which is in `psi_wave`,
-            `r_wave`, `phi_wave`, `p_wave`; `current_north`, `current_east`,
-            `wind_speed` and `wind_from` tell the weather. What instruments show of it
+            weather x and y are over ground, u and v through the water; psi and r
+            are without the first-order motion in waves, which is in `psi_wave` and
+            `r_wave`; `current_north`, `current_east`, `wind_speed` and `wind_from`
+            tell the weather. What instruments show of it
             all: `shipgym.trials.sensors.Sensors`.
         """
         from shipgym.models.simulate import simulate  # an environment does without

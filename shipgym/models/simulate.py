@@ -277,11 +277,9 @@ def as_trial(
 ) -> Trial:
     """Trial of states dt apart, their weather, and the commands held from each on."""
     channels = _channels(model, states)
-    rolls = "phi" in model.state_names
     weather = states[:, len(model.state_names) :]
     for name, values in zip(SEA_CHANNELS, weather.T, strict=False):
-        if rolls or name not in ("phi_wave", "p_wave"):
-            channels[name] = values
+        channels[name] = values
     for name, command in zip(model.command_names, commands.T, strict=True):
         channels[f"{name}_command"] = command
         if name == "n":

@@ -301,9 +301,11 @@ def _read_part(kind: type[Any], content: Any, where: str) -> Any:
 
 
 def as_weather(
-    weather: Weather | str | None, where: str, from_deg: float | None = 45.0
+    weather: Weather | Mapping[str, Any] | str | None,
+    where: str,
+    from_deg: float | None = 45.0,
 ) -> Weather:
-    """Return a weather, that of a sea state by name, or calm for None.
+    """Return a weather, one from its parts, that of a sea state, or calm for None.
 
     InputError, beginning with `where`, for anything else.
     """
@@ -311,6 +313,8 @@ def as_weather(
         return Weather(name="calm")
     if isinstance(weather, Weather):
         return weather
+    if isinstance(weather, Mapping):
+        return Weather.from_dict(weather, where)
     if not isinstance(weather, str):
         raise InputError(
             f"{where}: expected a Weather of shipgym.sea or the name of a sea state,"

@@ -52,11 +52,16 @@ def _axes(model: ManoeuvringModel) -> list[int]:
     return [axis for axis, name in enumerate(velocities) if name in moving]
 
 
+def roll_stiffness(model: ManoeuvringModel) -> float:
+    """Righting moment by heel, m g GM, N m."""
+    ship = weather_particulars(model.particulars)
+    return ship.require("mass") * GRAVITY * ship.require("metacentric_height")
+
+
 def roll_inertia(model: ManoeuvringModel) -> float:
     """Inertia in roll with that of the water, m g GM (T / 2 pi)^2, kg m2."""
     ship = weather_particulars(model.particulars)
-    stiffness = ship.require("mass") * GRAVITY * ship.require("metacentric_height")
-    return stiffness * (ship.require("roll_period") / (2.0 * np.pi)) ** 2
+    return roll_stiffness(model) * (ship.require("roll_period") / (2.0 * np.pi)) ** 2
 
 
 def _container_roll(model: ManoeuvringModel, mass: Floats) -> Floats:

@@ -1,17 +1,15 @@
-"""First-order heading and roll in waves: closed-form responses over the spectrum."""
+"""First-order heading in waves, and the slope of the waves that rolls a ship."""
 
 from dataclasses import dataclass
 
-import numpy as np
 from numpy import cos, exp, pi, sin, sinc, trapezoid
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 from shipgym.sea.conditions import Waves
-from shipgym.sea.estimates import Hull, hull_of, weather_particulars
+from shipgym.sea.estimates import hull_of, weather_particulars
 from shipgym.sea.harmonics import circle, half_circle, mirrored
 from shipgym.sea.waves import (
-    encounter_frequency,
     frequencies,
     over_directions,
     wave_number,
@@ -43,28 +41,17 @@ def heading_response(
     return sideways * 6.0 / hull.L * over_length
 
 
-def roll_response(
-    omega: ArrayLike, chi: ArrayLike, particulars: Particulars, speed: float
+def effective_wave_slope(
+    omega: ArrayLike, chi: ArrayLike, particulars: Particulars
 ) -> Floats:
-    """Amplitude of roll by wave amplitude, rad/m.
+    """Slope of the waves across a hull, averaged over it, by their amplitude, rad/m.
 
-    A linear oscillator driven by the effective wave slope: k |sin chi| exp(-k T / 2),
-    averaged over length and beam, times the amplification 1 / sqrt((1 - a^2)^2 + (2 z
-    a)^2), a = encounter by natural frequency (Conolly 1969, Rolling and its
-    stabilisation by active fins, Transactions of RINA 111; Lloyd 1989, Seakeeping). In
-    long waves it is the wave slope across the ship. The relative damping z is 0.1, of
-    a ship under way, with bilge keels (0.05 to 0.15 in the literature). Arguments are
-    those of :func:`heading_response`, and the speed, m/s.
+    k |sin chi| exp(-k T / 2), averaged over length and beam; its moment is that of a
+    heel so large (Conolly 1969, Rolling and its stabilisation by active fins,
+    Transactions of RINA 111; Lloyd 1989, Seakeeping). In long waves it is the wave
+    slope across the ship. Arguments are those of :func:`heading_response`.
     """
-    slope = _effective_wave_slope(omega, chi, hull_of(particulars))
-    natural = 2.0 * pi / particulars.require("roll_period")
-    a = encounter_frequency(omega, speed, chi) / natural
-    z = 0.1
-    return slope / np.hypot(1.0 - a * a, 2.0 * z * a)
-
-
-def _effective_wave_slope(omega: ArrayLike, chi: ArrayLike, hull: Hull) -> Floats:
-    """Slope of the waves across a hull, averaged over it, by their amplitude, rad/m."""
+    hull = hull_of(particulars)
     k = wave_number(omega)
     sine = sin(chi)
     cosine = cos(chi)
@@ -78,24 +65,22 @@ def _effective_wave_slope(omega: ArrayLike, chi: ArrayLike, hull: Hull) -> Float
 
 @dataclass(frozen=True)
 class WaveMotion:
-    """Variance of wave-induced heading and roll over the direction of the waves."""
+    """Variance of wave-induced heading, and of the slope that rolls the ship."""
 
     # shape (points,), 0 to below 2 pi; where waves come from, seen from the bow, pi / 2
     # from starboard; rad
     chi: Floats
-    # shape (points,); rad2
+    # shape (points,), over the direction of the waves; rad2
     heading_variance: Floats
-    roll_variance: Floats
+    slope_variance: Floats
 
 
 def wave_motion(waves: Waves, particulars: Particulars) -> WaveMotion:
-    """Variance of wave-induced heading and roll for waves from all directions.
+    """Variance of wave-induced heading and wave slope for waves from all directions.
 
-    Particulars are estimated where absent, as in :func:`shipgym.sea.wave_drift`. Roll
-    meets the waves at service speed, or 0 where that is not known.
+    Particulars are estimated where absent, as in :func:`shipgym.sea.wave_drift`.
     """
     ship = weather_particulars(particulars)
-    U = ship.speed or 0.0
     chi = half_circle()[:, None]
     omega = frequencies(waves)
     spectrum = wave_spectrum(waves, omega)
@@ -107,5 +92,5 @@ def wave_motion(waves: Waves, particulars: Particulars) -> WaveMotion:
     return WaveMotion(
         circle(),
         heading_variance=variance(heading_response(omega, chi, ship)),
-        roll_variance=variance(roll_response(omega, chi, ship, U)),
+        slope_variance=variance(effective_wave_slope(omega, chi, ship)),
     )

@@ -55,7 +55,7 @@ class SeaParameters(NamedTuple):
     drift_yaw: Sines
     drift_roll: Sines
     heading_variance: Cosines
-    roll_variance: Cosines
+    roll_variance: Cosines  # (rad/s2)^2, of the acceleration by the slope of the waves
 
 
 class Sea(NamedTuple):
@@ -78,8 +78,6 @@ class Sea(NamedTuple):
     roll_velocity: float
     psi_wave: float  # first-order motion, rad, rad/s
     r_wave: float
-    phi_wave: float
-    p_wave: float
 
 
 class FromBow(NamedTuple):
@@ -106,12 +104,10 @@ class Accelerations(NamedTuple):
 
 
 class FirstOrderMotion(NamedTuple):
-    """First-order motion in waves: angles, rad, and their rates, rad/s."""
+    """First-order motion in waves: heading, rad, and its rate, rad/s."""
 
     psi: float
     r: float
-    phi: float
-    p: float
 
 
 def from_bow(sine: float, cosine: float, north: float, east: float) -> FromBow:
@@ -152,7 +148,7 @@ def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
         wind.surge + drift.surge,
         wind.sway + drift.sway,
         wind.yaw + drift.yaw,
-        wind.roll + drift.roll,
+        wind.roll + drift.roll + by_wave_slope(waves, sea, p),
         sea.current_north,
         sea.current_east,
     )
@@ -190,6 +186,14 @@ def by_waves(waves: FromBow, drift: float, p: SeaParameters) -> Accelerations:
     )
 
 
+def by_wave_slope(waves: FromBow, sea: Sea, p: SeaParameters) -> float:
+    """Acceleration in roll by the slope of the waves that the ship meets, rad/s2."""
+    if not HAS_ROLL:
+        return 0.0
+    variance = sum_of_cosines(waves.cosine, p.roll_variance)
+    return sqrt(max(variance, 0.0)) * sea.roll_velocity
+
+
 def waves_from_bow(motion: Motion, sea: Sea) -> FromBow:
     """Angle from the bow to where the waves come from."""
     sine, cosine = sin_cos(motion.psi)
@@ -218,7 +222,6 @@ def first_order_motion(
     waves: FromBow,
     frequency: float,
     heading: Oscillator,
-    roll: Oscillator,
     p: SeaParameters,
 ) -> FirstOrderMotion:
     """First-order motion of a ship that meets waves at an angle and a frequency, rad/s.
@@ -230,15 +233,9 @@ def first_order_motion(
     """
     variance = sum_of_cosines(waves.cosine, p.heading_variance)
     yaw = sqrt(max(variance, 0.0))
-    heel = 0.0
-    if HAS_ROLL:
-        variance = sum_of_cosines(waves.cosine, p.roll_variance)
-        heel = sqrt(max(variance, 0.0))
     return FirstOrderMotion(
         psi=yaw * heading.velocity,
         r=-yaw * frequency * heading.displacement,
-        phi=heel * roll.velocity,
-        p=-heel * frequency * roll.displacement,
     )
 
 
@@ -258,7 +255,7 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
     if HAS_ROLL:
         roll = Oscillator(sea.roll_displacement, sea.roll_velocity)
         roll = stepped(roll, normal(word, DRAW[6]), normal(word, DRAW[7]), step)
-    first_order = first_order_motion(waves, frequency, heading, roll, p)
+    first_order = first_order_motion(waves, frequency, heading, p)
 
     return Sea(
         mean_north=sea.mean_north,
@@ -297,8 +294,6 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
         roll_velocity=roll.velocity,
         psi_wave=first_order.psi,
         r_wave=first_order.r,
-        phi_wave=first_order.phi,
-        p_wave=first_order.p,
     )
 
 
@@ -338,7 +333,7 @@ def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
     sine, cosine = sin_cos(motion.psi)
     waves = from_bow(sine, cosine, waves_north, waves_east)
     frequency = encounter(waves, motion.u, motion.v, p)
-    first_order = first_order_motion(waves, frequency, heading, roll, p)
+    first_order = first_order_motion(waves, frequency, heading, p)
     return Sea(
         mean_north=mean_north,
         mean_east=mean_east,
@@ -356,8 +351,6 @@ def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
         roll_velocity=roll.velocity,
         psi_wave=first_order.psi,
         r_wave=first_order.r,
-        phi_wave=first_order.phi,
-        p_wave=first_order.p,
     )
 
 
@@ -380,8 +373,6 @@ def add_current(sea: Sea, north: float, east: float) -> Sea:
         roll_velocity=sea.roll_velocity,
         psi_wave=sea.psi_wave,
         r_wave=sea.r_wave,
-        phi_wave=sea.phi_wave,
-        p_wave=sea.p_wave,
     )
 
 

@@ -9,7 +9,7 @@ from shipgym.sea.conditions import Current, Waves, Weather, Wind
 from shipgym.sea.drift import wave_drift
 from shipgym.sea.filters import Filter, GaussMarkov
 from shipgym.sea.harmonics import Harmonics, cosine_coefficients, harmonics
-from shipgym.sea.mobility import mobility_matrix
+from shipgym.sea.mobility import mobility_matrix, roll_stiffness
 from shipgym.sea.motions import wave_motion
 from shipgym.sea.open_sea import SeaParameters
 from shipgym.sea.series import Cosines, Sines
@@ -133,7 +133,9 @@ def with_waves(
         drift_yaw=Sines(*by_waves.N),
         drift_roll=Sines(*by_waves.K),
         heading_variance=_variances(motion.heading_variance),
-        roll_variance=_variances(motion.roll_variance),
+        roll_variance=_variances(
+            (roll_stiffness(model) * mobility[3, 3]) ** 2 * motion.slope_variance
+        ),
     )
 
 

@@ -17,14 +17,14 @@ from shipgym.ships.steering import SteeringGear
 
 LENGTH = 175.0  # m
 WEIGHT = 9.81 * 21222.0  # by density, m^4/s^2, of the displaced volume
-GM = 0.3  # m
 RUDDER_AREA = 33.0376  # m^2
 ASPECT_RATIO = 1.8219
 DIAMETER = 6.533  # of the propeller, m
 
-#: As published; without unit.
+#: As published; without unit but for the metacentric height GM, m.
 Coefficients = record_of(
     {
+        "GM": 0.3,
         # mass and added mass, their moments of inertia and lever arms
         "m": 0.00792,
         "mx": 0.000238,
@@ -129,7 +129,7 @@ def accelerations(
 
     # W' GM'
     weight = WEIGHT / (0.5 * L * L)
-    W_GM = (weight * GM / L) * per_U * per_U
+    W_GM = (weight * c.GM / L) * per_U * per_U
 
     at = State(u, v, r, p, phi)
     Y_H = hull(
@@ -320,7 +320,7 @@ SHIP = ShipEquations(
         speed=8.376672395256,
         rudder_area=RUDDER_AREA,
         propeller_diameter=DIAMETER,
-        metacentric_height=GM,
+        metacentric_height=PUBLISHED.GM,
         water_density=1025.0,
         X_udot=-PUBLISHED.mx,
         Y_vdot=-PUBLISHED.my,

@@ -6,7 +6,7 @@ rate (weight 0.01), all in units of 30 degrees, the rate per ship length sailed 
 the largest heading error, so that ending early is never an advantage.
 """
 
-from math import fabs, floor, pi, radians
+from math import fabs, floor, radians
 from typing import Annotated, NamedTuple
 
 from shipgym.engine.mathematics import wrap
@@ -63,6 +63,17 @@ class Settings(NamedTuple):
             at_most=180.0,
         ),
     ] = 90.0
+    first_course_deg: Annotated[
+        float,
+        Setting(
+            "The first course is drawn within so many degrees of north.",
+            at_least=0.0,
+            at_most=180.0,
+        ),
+    ] = 180.0
+    speed_weight: Annotated[
+        float, Setting("Cost of a step without way.", at_least=0.0)
+    ] = 0.0
     weights: Weights = Weights()
     course_changes_deg: Annotated[
         Numbers,
@@ -90,6 +101,7 @@ class Reward(NamedTuple):
     """Parts of the reward."""
 
     heading: float
+    speed: float
     steering: SteeringReward
 
 
@@ -107,7 +119,8 @@ def begin(
     plan: Numbers,
 ) -> tuple[Motion, State]:
     """Begin an episode on a random heading, with a first set-point."""
-    heading = drawn(random, 0, -pi, pi)
+    furthest = radians(settings.first_course_deg)
+    heading = drawn(random, 0, -furthest, furthest)
     motion = at_service_speed(0.0, 0.0, heading, ship)
     before = State(
         heading_setpoint=heading,
@@ -183,8 +196,10 @@ def step(
     error = wrap(state.heading_setpoint - motion.psi)
     integral = integrated(state.integral, error, interval, ship, weights)
     scaled = error * (1.0 / radians(weights.heading_scale_deg))
+    way_lost = 1.0 - motion.u * (1.0 / ship.scale_speed)
     reward = Reward(
         heading=-scaled * scaled,
+        speed=-settings.speed_weight * max(way_lost, 0.0),
         steering=steering_reward(motion, interval, ship, weights),
     )
     after = State(

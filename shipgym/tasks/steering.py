@@ -45,6 +45,9 @@ class Weights(NamedTuple):
     roll_scale_deg: Annotated[
         float, Setting("Heel whose cost equals its weight, degrees.", above=0.0)
     ] = 30.0
+    roll_free_deg: Annotated[
+        float, Setting("Heel that costs nothing, degrees.", at_least=0.0)
+    ] = 0.0
     envelope_weight: Annotated[
         float, Setting("Cost of a step in which the model extrapolates.", at_least=0.0)
     ] = 0.0
@@ -222,10 +225,11 @@ def steering_reward(
     per_length = ship.length / ship.scale_speed / interval.dt
     rudder = per_scale * motion.delta
     rate = per_scale * per_length * (motion.delta - interval.rudder_before)
-    heel = per_heel * motion.phi
+    beyond = fabs(motion.phi) - radians(weights.roll_free_deg)
+    roll = per_heel * max(beyond, 0.0)
     return SteeringReward(
         rudder=-weights.rudder_weight * rudder * rudder,
         rudder_rate=-weights.rudder_rate_weight * rate * rate,
-        roll=-weights.roll_weight * heel * heel,
+        roll=-weights.roll_weight * roll * roll,
         envelope=-weights.envelope_weight * interval.extrapolating,
     )

@@ -58,8 +58,8 @@ class Trial:
     (rad), rudder ``delta`` (rad, positive steers to starboard) and shaft speed ``n``
     (rev/s), with the orders ``delta_command`` and ``n_command``; of captive tests the
     forces ``X`` ahead and ``Y`` to starboard (N) and the yaw moment ``N`` about midship
-    (N m). Simulated in weather: first-order motion in waves ``psi_wave``, ``r_wave``,
-    ``phi_wave`` and ``p_wave``, which is not in psi, r, phi and p, the current
+    (N m). Simulated in weather: first-order motion in waves ``psi_wave`` and
+    ``r_wave``, which is not in psi and r, the current
     ``current_north`` and ``current_east`` (m/s) and the wind ``wind_speed`` (m/s) and
     ``wind_from`` (rad). Raises InputError for unknown channels, lengths that differ,
     values that are not finite, or time that goes back.

@@ -87,7 +87,7 @@ def longer(name: str, stretch: float) -> Any:
 
 
 COURSE, PATH = "CourseKeeping", "PathFollowing"
-VARIANTS = ("", "Discrete", "Shaft", "Roll")
+VARIANTS = ("", "Discrete", "Shaft")
 CHANGING_SEA = shipgym.Weather(
     current=shipgym.Current(1.0, towards_deg=90.0, variation=0.3),
     wind=shipgym.Wind(12.0, from_deg=20.0),
@@ -107,6 +107,7 @@ def cases() -> dict[str, Case]:
         for task in (COURSE, PATH)
         for variant in VARIANTS
     }
+    found |= {name: Case(name) for name in ("RudderRoll", f"{PATH}Roll")}
     for model in shipgym.list_models():
         for task in (
             (COURSE, PATH) if model != "mariner-tls-svm" else ()
@@ -154,8 +155,8 @@ def cases() -> dict[str, Case]:
         COURSE,
         {"model": "kvlcc2-rm-svm", "model_uncertainty": "posterior", "sea": "rough"},
     )
-    found[f"{COURSE} Roll astern"] = Case(
-        f"{COURSE}Roll",
+    found["RudderRoll astern"] = Case(
+        "RudderRoll",
         {"model": "container", "action": "rudder-shaft", "sea": "rough"},
     )
     found[f"{PATH} waypoints"] = Case(

@@ -77,8 +77,8 @@ def cases() -> dict[str, Case]:
         ),
         "course single": Case(course, {**COSTS, **COURSES, "dt": 5.5}, single=True),
         "course roll": Case(
-            "CourseKeepingRoll",
-            {**COSTS, **COURSES, "model": "container", "sea": "rough"},
+            "CourseKeeping",
+            {**COSTS, **COURSES, "model": "container", "roll": True, "sea": "rough"},
         ),
         "path": Case(
             path,

@@ -199,9 +199,9 @@ def test_drift_and_motion_are_finite_for_any_ship_in_any_sea(
         drift.Y,
         drift.N,
         motion.heading_variance,
-        motion.roll_variance,
+        motion.slope_variance,
     ):
         assert np.isfinite(curve).all()
     assert drift.time_constant > 0.0
-    for variance in (motion.heading_variance, motion.roll_variance):
+    for variance in (motion.heading_variance, motion.slope_variance):
         assert variance.min() >= -1e-9 * variance.max()
