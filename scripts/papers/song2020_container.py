@@ -162,7 +162,7 @@ def known_forces(motion: Mapping[str, Any]) -> dict[str, Any]:
     v = motion["v"] / U
     r = motion["r"] * L / U
     hull = own.PUBLISHED
-    righting = own.WEIGHT / (0.5 * L * L) * own.GM / L / U**2
+    righting = own.WEIGHT / (0.5 * L * L) * hull.GM / L / U**2
     return {
         "u": (hull.m + hull.my) * v * r,
         "v": -(hull.m + hull.mx) * u * r,
