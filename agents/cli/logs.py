@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Argument, Option
 
 if TYPE_CHECKING:
-    from shipgym.trials.guesses import ColumnGuess, Decision, RudderSide, TrialGuess
+    from shipgym.trials.guesses import (
+        ColumnGuess,
+        ConventionGuess,
+        Decision,
+        RudderSide,
+        TrialGuess,
+    )
+
+_STEERING = frozenset({"delta", "delta_command"})
+_TURNING = frozenset({"psi", "r"})
 
 
 def new_ship_command(
@@ -60,7 +69,7 @@ def new_ship_command(
             "columns": _columns(first),
             "unused": first.unused,
             "rudder_positive": side.side if side else None,
-            **facts["conventions"],
+            **{one.name: one.value for one in facts["conventions"]},
             "to_decide": facts["to_decide"],
             "notes": notes,
         }
@@ -83,7 +92,10 @@ def _facts(guessed: list[TrialGuess], out: Path) -> dict[str, Any]:
         "decisions": _decisions(guessed),
         "to_decide": _to_decide(guessed, side),
         "side": side,
-        "no_rudder": not any(_has_rudder(one) for one in guessed),
+        "no_rudder": not any(_has(one, _STEERING) for one in guessed),
+        "can_identify": any(
+            _has(one, _STEERING) and _has(one, _TURNING) for one in guessed
+        ),
         "conventions": _conventions(guessed),
         "trial": first.trial,
         "trial_columns": first.columns,
@@ -102,8 +114,8 @@ def _notes(guessed: list[TrialGuess]) -> list[str]:
     return notes
 
 
-def _conventions(guessed: list[TrialGuess]) -> dict[str, str]:
-    """Conventions of logs by name.
+def _conventions(guessed: list[TrialGuess]) -> list[ConventionGuess]:
+    """Conventions of logs that are not the usual ones, each name once.
 
     One log with another convention is enough: the usual one is also guessed from a log
     that does not tell.
@@ -111,8 +123,8 @@ def _conventions(guessed: list[TrialGuess]) -> dict[str, str]:
     conventions = {}
     for one in guessed:
         for convention in one.conventions:
-            conventions[convention.name] = convention.value
-    return conventions
+            conventions[convention.name] = convention
+    return [*conventions.values()]
 
 
 def _rudder_side(guessed: list[TrialGuess]) -> RudderSide | None:
@@ -132,13 +144,12 @@ def _rudder_side(guessed: list[TrialGuess]) -> RudderSide | None:
     return sides[0] if sides else None
 
 
-def _has_rudder(guess: TrialGuess) -> bool:
-    """Return whether a log has, or may have, a rudder angle."""
-    steering = {"delta", "delta_command"}
+def _has(guess: TrialGuess, channels: frozenset[str]) -> bool:
+    """Return whether a log has, or may have, one of some channels."""
     named = {one.channel for one in guess.columns}
     asked = {one.key for one in guess.decisions}
-    in_trial = guess.trial is not None and "delta" in guess.trial
-    return in_trial or bool(steering & (named | asked))
+    in_trial = guess.trial.channels.keys() if guess.trial is not None else set()
+    return bool(channels & {*named, *asked, *in_trial})
 
 
 def _shared_columns(guessed: list[TrialGuess]) -> list[ColumnGuess]:

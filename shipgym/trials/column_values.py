@@ -25,8 +25,14 @@ _COMMON = (-32768.0, 32767.0, 65535.0, 2147483647.0, -2147483648.0, 4294967295.0
 
 
 def column_numbers(table: LogTable, column: Column) -> Floats:
-    """Numbers of a column; of two rudders the mean, of a command degrees of rudder."""
+    """Numbers of a column; of two rudders the mean, of a command degrees of rudder.
+
+    Of a quaternion the heading, rad.
+    """
     numbers = table.numbers(column.name, sided=True)
+    if column.quaternion is not None:
+        x, y, z = (table.numbers(name) for name in column.quaternion)
+        return _yaw(numbers, x, y, z)
     if column.mean_with is not None:
         others = table.numbers(column.mean_with, sided=True)
         numbers = 0.5 * (numbers + others)
@@ -39,6 +45,14 @@ def column_numbers(table: LogTable, column: Column) -> Floats:
     from_neutral = numbers - column.neutral
     deflection = from_neutral / column.full
     return deflection * FULL_RUDDER_DEG
+
+
+def _yaw(w: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
+    """Yaw of a quaternion, about z and first of the angles of Tait and Bryan, rad."""
+    sine = 2.0 * (w * z + x * y)
+    cosine = 1.0 - 2.0 * (y * y + z * z)
+    yaw: Floats = np.arctan2(sine, cosine)
+    return yaw
 
 
 def two_rudders_note(table: LogTable, column: Column) -> str:

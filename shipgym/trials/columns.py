@@ -33,6 +33,7 @@ class Column:
     neutral: float = 0.0  # number of a steering command that steers straight
     mean_with: str | None = None  # column of the other rudder
     full: float | None = None  # change of the command that counts as 35 deg of rudder
+    quaternion: tuple[str, ...] | None = None  # columns of x, y and z, beside that of w
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,8 @@ def parse_columns(
 
     Each entry is the name of a column or ``{"column": name, "unit": unit}``. That of
     the time may also have ``"date"``, the column of the date, ``"nanoseconds"`` and
-    ``"zone"``, that of the rudder ``"full"``, ``"neutral"`` and ``"minus"``, which make
+    ``"zone"``, that of the heading ``"quaternion"``, the columns of x, y and z beside
+    that of w, that of the rudder ``"full"``, ``"neutral"`` and ``"minus"``, which make
     a steering command, or ``"mean_with"``, the column of a second rudder. `where`
     begins the messages. Raises InputError for an unknown channel, key or unit, and for
     a unit of another quantity.
@@ -94,6 +96,8 @@ def _parse_column(channel: str, entry: Any, where: str) -> Column:
         keys += ["date", "zone", "nanoseconds"]
     if channel in ("delta", "delta_command"):
         keys += ["mean_with", "minus", "neutral", "full"]
+    if channel == "psi":
+        keys += ["quaternion"]
     check_keys(fields, keys, where)
     name = fields.pop("column", None)
     if not isinstance(name, str):
@@ -107,11 +111,25 @@ def _parse_column(channel: str, entry: Any, where: str) -> Column:
     if "unit" in fields:
         si_factor(channel, fields["unit"], where)
     command = _steering_command(fields, where)
+    if "quaternion" in fields:
+        command["quaternion"] = _quaternion(fields, where)
     for field in fields.values():
         check_text(field, where)
     if "zone" in fields:
         zone_seconds(fields["zone"], f"{where} zone")
     return Column(name.strip(), **fields, **command)
+
+
+def _quaternion(fields: dict[str, Any], where: str) -> tuple[str, ...]:
+    """Take the columns of x, y and z out of the fields of the column of w, checked."""
+    names = fields.pop("quaternion")
+    are_three = isinstance(names, list | tuple) and len(names) == 3
+    if not are_three or not all(isinstance(name, str) for name in names):
+        raise InputError(
+            f"{where} quaternion: expected the columns of x, y and z, beside that of w"
+            f' in column, such as ["q[1]", "q[2]", "q[3]"], got {names!r}'
+        )
+    return tuple(name.strip() for name in names)
 
 
 def _steering_command(fields: dict[str, Any], where: str) -> dict[str, Any]:

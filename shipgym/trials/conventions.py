@@ -14,6 +14,7 @@ from shipgym.trials.units import DEGREE
 _WORDS = {
     "rudder_positive": ("starboard", "port"),
     "velocity_frame": ("body", "earth"),
+    "frame": ("ned", "enu"),
     "origin": ("midship", "cg"),
     "repair": ("interpolate",),
 }
@@ -135,6 +136,7 @@ class Conventions:
 
     rudder_positive: str = "starboard"
     velocity_frame: str = "body"
+    frame: str = "ned"
     origin: str = "midship"
     xg: float | None = None
     repair: str | None = None

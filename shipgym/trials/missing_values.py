@@ -9,10 +9,8 @@ import numpy.typing as npt
 from shipgym.arrays import Flags, Floats
 from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
+from shipgym.trials.readers.log_table import REPAIR
 from shipgym.trials.resampling import FEWEST_SAMPLES, usual_step
-
-#: The setting with which missing values are filled.
-REPAIR = ("repair", "interpolate")
 
 
 def check_time(t: Floats, locator: Locator) -> None:
@@ -97,7 +95,6 @@ def _check_present(
     proposals = [REPAIR]
     if name == "t":
         remedy = "time cannot be interpolated, remove the row"
-        proposals = []
     raise InputError(
         f"{place}: expected a number, got no value ({found:g}); {remedy}"
         f" ({lacking} of {t.size} rows lack a value)",

@@ -15,7 +15,7 @@ from shipgym.trials.column_values import (
     without_sentinels,
 )
 from shipgym.trials.columns import Column, Locator, choose_columns
-from shipgym.trials.missing_values import REPAIR, check_time, fill_missing
+from shipgym.trials.missing_values import check_time, fill_missing
 from shipgym.trials.navigation import local_metres
 from shipgym.trials.plausibility.values import (
     check_heading,
@@ -24,7 +24,7 @@ from shipgym.trials.plausibility.values import (
     without_clock_jumps,
     without_spikes,
 )
-from shipgym.trials.readers.log_table import LogTable
+from shipgym.trials.readers.log_table import REPAIR, LogTable
 from shipgym.trials.resampling import (
     FEWEST_SAMPLES,
     Signal,
@@ -78,6 +78,12 @@ def read_recording(
     chosen = choose_columns(table, columns, part=part)
     if _PAIRS.keys() & chosen.keys():
         _check_pairs(table, chosen)
+    notes: list[str] = []
+    if repair is not None:
+        known = len(table.notes)
+        names = [column.name for column in chosen.values()]
+        table = table.without_odd_cells(names, chosen["t"].name)
+        notes += table.notes[known:]
     times = read_times(table, chosen["t"])
     chosen["t"] = replace(chosen["t"], unit=times.unit)
     locator = Locator(
@@ -86,7 +92,7 @@ def read_recording(
         rows=np.arange(times.t.size),
     )
 
-    notes = list(times.notes)
+    notes += times.notes
     channels = _read_numbers(locator, notes)
     outliers = 0
     if "lat" in chosen:

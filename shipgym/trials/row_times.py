@@ -10,7 +10,7 @@ from shipgym.errors import InputError
 from shipgym.trials.clock_texts import DAY, read_clock, spread_evenly, zone_seconds
 from shipgym.trials.columns import Column
 from shipgym.trials.readers.cell_texts import is_number
-from shipgym.trials.readers.log_table import LogTable
+from shipgym.trials.readers.log_table import REPAIR, LogTable
 from shipgym.trials.units import si_factor
 
 _WEEK = 7.0 * DAY
@@ -154,7 +154,8 @@ def _read_clock_cells(table: LogTable, column: Column, cells: list[str]) -> Floa
     raise InputError(
         f"{place}: expected a number, ISO 8601"
         " (2024-05-31T09:30:00), or a time of day with its date in another column:"
-        f' t = {{ column = "{column.name}", date = "..." }}, got {beginning!r}'
+        f' t = {{ column = "{column.name}", date = "..." }}, got {beginning!r}',
+        [REPAIR],
     )
 
 

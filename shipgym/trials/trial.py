@@ -292,6 +292,7 @@ class Trial:
         rudder_positive: str = "starboard",
         velocity_frame: str = "body",
         *,
+        frame: str = "ned",
         origin: str = "midship",
         xg: float | None = None,
         repair: str | None = None,
@@ -323,6 +324,9 @@ class Trial:
             Side to which a positive rudder angle of the file steers.
         velocity_frame : {"body", "earth"}
             Frame of columns u and v: "earth" means north and east velocity.
+        frame : {"ned", "enu"}
+            Frame of angles and positions: "enu", as of ROS, counts headings from east
+            and, with yaw rates and sway, to port, and has x east and y north.
         origin : {"midship", "cg"}
             Point whose position and velocity the file holds; "cg" needs `xg`.
         xg : float, optional
@@ -344,6 +348,7 @@ class Trial:
         conventions = Conventions(
             rudder_positive=rudder_positive,
             velocity_frame=velocity_frame,
+            frame=frame,
             origin=origin,
             xg=xg,
             repair=repair,

@@ -15,7 +15,7 @@ from shipgym.trials.conventions import AS_LOGGED, Conventions, Installation
 from shipgym.trials.cuts import check_cut
 from shipgym.trials.trial import KINDS, USES
 
-_CONVENTIONS = ("rudder_positive", "velocity_frame", "origin", "repair")
+_CONVENTIONS = ("rudder_positive", "velocity_frame", "frame", "origin", "repair")
 _KEYS = ("file", "kind", "use", "columns", "cut", "sensors", *_CONVENTIONS)
 
 

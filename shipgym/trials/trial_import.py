@@ -1,5 +1,6 @@
 """Conversion of the tables of a log to channels in SI units, at midship."""
 
+import math
 from collections.abc import Mapping, Sequence
 
 from shipgym.checks import quoted
@@ -18,6 +19,7 @@ from shipgym.trials.plausibility.agreement import (
     check_velocity,
     check_yaw_rate,
 )
+from shipgym.trials.plausibility.frozen import frozen_heading
 from shipgym.trials.plausibility.over_ground import check_over_ground
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.recording import Recording, read_recording
@@ -34,6 +36,10 @@ from shipgym.trials.units import QUANTITIES
 _NO_RUDDER = (
     "no rudder angle in this log: without rudder nothing can be identified from it, it"
     " can only be looked at; log the rudder too (in NMEA 0183 the sentence RSA)"
+)
+_NO_HEADING = (
+    "no heading in this log: without it turning and drift cannot be told, and nothing"
+    " can be identified; log the heading too (in NMEA 0183 the sentence HDT)"
 )
 
 _MAGNETIC = (
@@ -67,6 +73,8 @@ def import_tables(
         signals |= _on_first_clock(other, first, signals)
     if conventions.rudder_positive == "port":
         _turn_rudder(signals)
+    if conventions.frame == "enu":
+        _turn_frame(signals, recordings, conventions.velocity_frame)
 
     log = on_one_clock(signals, first.locator.path)
     motion_remarks = _check_motion(log, recordings, conventions)
@@ -163,6 +171,28 @@ def _turn_rudder(signals: Signals) -> None:
         signals[name] = signal._replace(values=0.0 - signal.values)
 
 
+def _turn_frame(
+    signals: Signals, recordings: Sequence[Recording], velocity_frame: str
+) -> None:
+    """Make angles that count from east to port those from north to starboard.
+
+    As ROS has them: x east and y north, body forward and to port.
+    """
+    in_body = velocity_frame == "body"
+    to_port = {"psi", "r", "Y", "N", "v"} if in_body else {"psi", "r", "Y", "N"}
+    for name in signals.keys() & to_port:
+        signal = signals[name]
+        zero = 0.5 * math.pi if name == "psi" else 0.0
+        signals[name] = signal._replace(values=zero - signal.values)
+
+    pairs = [] if in_body else [("u", "v")]
+    if not any("lat" in one.locator.columns for one in recordings):
+        pairs.append(("x", "y"))
+    for east, north in pairs:
+        if {east, north} <= signals.keys():
+            signals[east], signals[north] = signals[north], signals[east]
+
+
 def _check_motion(
     log: Log, recordings: Sequence[Recording], conventions: Conventions
 ) -> list[str]:
@@ -173,11 +203,14 @@ def _check_motion(
         has_positions |= "lat" in recording.locator.columns
 
     remarks = []
-    if has_positions and not log.has("delta"):
+    if not log.has("delta") and not log.has("delta_command") and not log.has("X"):
         remarks.append(_NO_RUDDER)
+    if not log.has("psi") and not log.has("r"):
+        remarks.append(_NO_HEADING)
+    remarks += frozen_heading(log)
     remarks += check_steps(log.t, locator)
     if has_positions or log.has("ground_north"):
-        remarks += check_over_ground(log, conventions.installation, locator)
+        remarks += check_over_ground(log, conventions, locator)
     return remarks
 
 

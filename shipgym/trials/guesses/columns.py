@@ -12,21 +12,36 @@ import numpy as np
 from shipgym.files import shipped_toml
 from shipgym.trials.column_values import without_sentinels
 from shipgym.trials.columns import Column
+from shipgym.trials.guesses.attitudes import Quaternion, quaternion
 from shipgym.trials.guesses.steering import other_rudder, steering_command
 from shipgym.trials.guesses.units import (
+    UNKNOWN,
     UnitGuess,
     named_unit,
     names_another_quantity,
     unit_by_size,
+    unknown_unit,
 )
 from shipgym.trials.readers.cell_texts import number_with_unit
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.units import QUANTITIES, spelled_units, split_unit
 
 _WITH_UNIT = "with_unit"  # not a language
+#: Channels that stand still in no trial.
+_MOVING = ("t", "psi", "cog", "r", "delta", "delta_command")
+#: Words of a path whose x, y and z are no positions.
+_OF_TURNS = re.compile(r"orientation|quaternion|angular|accel|magnetic|rotation")
 _SIGNAL_K = re.compile(r"(navigation|steering|propulsion|environment)\.", re.IGNORECASE)
 _TIME_OF_DAY = re.compile(r"\d\d?:\d\d.*")
 _DATE = re.compile(r"\d+\W+\w+\W+\d+.*|\d{6}|\d{8}")
+#: Words in the name of another quantity than the rest of the name says.
+_OTHER_QUANTITY = {
+    *("acc", "accel", "acceleration", "reset", "relative", "apparent", "counter"),
+    *("covariance", "variance", "bias", "valid", "temp", "temperature", "gain"),
+}
+_ASKED_FOR = re.compile(
+    r"(^|[^a-z])(des|desired|dem|target|tgt|ref|set|cmd)(yaw|head|hdg|course|turn|speed)"
+)
 #: Words in the name of what a ship should do, or of what is no measured value.
 _NO_MEASUREMENT = {
     *("set", "setpoint", "sp", "desired", "target", "command", "commanded", "cmd"),
@@ -52,7 +67,8 @@ class ColumnGuess(NamedTuple):
     column: str
     unit: str
     reason: str
-    extra: tuple[tuple[str, str | float], ...] = ()  # other keys of the declaration
+    #: other keys of the declaration
+    extra: tuple[tuple[str, str | float | tuple[str, ...]], ...] = ()
 
     @property
     def is_named(self) -> bool:
@@ -123,8 +139,18 @@ def guess_columns(table: LogTable) -> list[ColumnGuess]:
             free.remove(found.column)
 
     for channel in names.known:
-        if channel in QUANTITIES:
+        if channel == "n" and not {"delta", "delta_command"} & guesses.keys():
+            command = steering_command(table, free)
+            if command is not None:
+                guesses["delta"] = ColumnGuess("delta", *command)
+        is_speed_alone = channel == "v" and "u" not in guesses
+        if channel in QUANTITIES and not is_speed_alone:
             take(channel, channel)
+    if "psi" not in guesses:
+        attitude = quaternion(table, free)
+        if attitude is not None:
+            guesses["psi"] = _heading_of(attitude)
+            free = [one for one in free if one not in {attitude.w, *attitude.others}]
     if "psi" not in guesses:
         take("psi", "course")
     elif "cog" not in guesses:
@@ -140,17 +166,18 @@ def guess_columns(table: LogTable) -> list[ColumnGuess]:
             guesses["t"] = even
     if "t" in guesses:
         guesses["t"] = _with_date(table, guesses["t"], free, names)
-    if "delta" not in guesses and "delta_command" not in guesses:
-        command = steering_command(table, free)
-        if command is not None:
-            column, reason, keys = command
-            extra = tuple(keys.items())
-            guesses["delta"] = ColumnGuess("delta", column, "deg", reason, extra)
     _settle_rudder(table, guesses)
     for channel in ("delta", "delta_command"):
         if channel in guesses:
             guesses[channel] = _with_other_rudder(table, guesses[channel], free)
     return [guesses[channel] for channel in names.known if channel in guesses]
+
+
+def _heading_of(attitude: Quaternion) -> ColumnGuess:
+    """The heading of a quaternion."""
+    reason = "of a quaternion, whose four columns have length 1"
+    extra = (("quaternion", attitude.others),)
+    return ColumnGuess("psi", attitude.w, "rad", reason, extra)
 
 
 def _settle_rudder(table: LogTable, guesses: dict[str, ColumnGuess]) -> None:
@@ -162,7 +189,7 @@ def _settle_rudder(table: LogTable, guesses: dict[str, ColumnGuess]) -> None:
             continue
         by_size = guess.reason.startswith("from its s")
         units = (guess.unit, heading.unit)
-        psi = table.numbers_if_all(heading.column, sided=True)
+        psi = table.likely_numbers(heading.column, sided=True)
         if not by_size or units != ("rad", "deg") or psi is None:
             continue
 
@@ -203,13 +230,14 @@ def _first_match(
     patterns: str,
 ) -> ColumnGuess | None:
     """Guess of a channel by the first of its patterns that a column has."""
-    fitting = {}
+    fitting: dict[str, UnitGuess] = {}
     for column in free:
         unit = _unit_where_fitting(table, column, channel)
-        if unit is not None:
+        if unit is not None and _may_be(table, column, channel):
             fitting[column] = unit
+    known_first = sorted(fitting.items(), key=lambda one: one[1].unit == UNKNOWN)
     for pattern in names.known[patterns]:
-        for column, unit in fitting.items():
+        for column, unit in known_first:
             if _matches(_forms(column, channel), [pattern]):
                 return ColumnGuess(channel, column, *unit)
     for column, unit in fitting.items():
@@ -226,25 +254,64 @@ def _unit_where_fitting(table: LogTable, column: str, channel: str) -> UnitGuess
     if names_another_quantity(units, channel):
         return None
     words = {*re.findall(r"[^\W\d_]+", text)}
+    if words & _OTHER_QUANTITY or _ASKED_FOR.search(text):
+        return None
     if channel in ("psi", "sog", "stw", "cog") and _NO_MEASUREMENT & words:
         return None
     unit = named_unit(units, channel)
+    unknown = None if unit else unknown_unit(column.lower())
     below = table.unit_row.get(column)
     if below is not None:
         row_unit = split_unit(f"x [{_spaced(below)}]").units
         if names_another_quantity(row_unit, channel):
             return None
         unit = named_unit(row_unit, channel, "from the row of units") or unit
+        unknown = unknown or (None if unit else unknown_unit(f"x [{below.lower()}]"))
+    if unknown is not None:
+        return UnitGuess(UNKNOWN, f"'{unknown}' is not known")
+    if unit is None and channel == "t":
+        glued = re.search(r"(?:time|stamp|clock)s?([mun]s)$", text)
+        unit = UnitGuess(glued[1]) if glued else None
     if unit is not None and (channel != "t" or _is_duration(table, column, unit)):
         return unit
     if _SIGNAL_K.match(column) and channel not in ("t", "lat", "lon"):
         size = unit_by_size(None, channel)
         return size._replace(reason="paths of Signal K are in SI units")
-    in_cells = _unit_in_cells(table, column, channel)
-    values = table.numbers_if_all(column, sided=True)
+    in_cells = _unit_in_cells(table, column, channel) or _of_recorder(table, column)
+    values = table.likely_numbers(column, sided=True)
     if values is not None and channel != "t":
         values, _ = without_sentinels(channel, values, factor=1.0)
     return in_cells or unit_by_size(values, channel)
+
+
+def _of_recorder(table: LogTable, column: str) -> UnitGuess | None:
+    """Unit that a recorder has by definition: MAVLink's attitude, ArduPilot's STER."""
+    name = _plain(column.lower())
+    values = table.likely_numbers(column)
+    if values is None or np.nanmax(np.abs(values), initial=0.0) > 6.3:
+        return None
+    if name.endswith("attitudeyaw"):
+        return UnitGuess("rad", "of MAVLink's attitude")
+    if name.endswith("attitudeyawspeed"):
+        return UnitGuess("rad/s", "of MAVLink's attitude")
+    has_steering = any(one.endswith("SteerOut") for one in table.header)
+    if name.endswith("turnrate") and has_steering:
+        return UnitGuess("deg/s", "of ArduPilot's message STER")
+    return None
+
+
+def _may_be(table: LogTable, column: str, channel: str) -> bool:
+    """Return whether the values of a column may be a channel's, whatever its name."""
+    values = table.likely_numbers(column, sided=True)
+    if values is None:  # texts, such as times and positions
+        return True
+    known = values[np.isfinite(values)]
+    if known.size < 3:
+        return False
+    if channel in _MOVING and np.ptp(known) == 0.0:
+        return False
+    goes_back = np.mean(known < -0.5) > 0.05
+    return not (channel in ("sog", "stw", "wind_speed") and goes_back)
 
 
 def _is_duration(table: LogTable, column: str, unit: UnitGuess) -> bool:
@@ -252,7 +319,7 @@ def _is_duration(table: LogTable, column: str, unit: UnitGuess) -> bool:
 
     Seconds of 1.7e9 count from 1970.
     """
-    values = table.numbers_if_all(column, sided=True)
+    values = table.likely_numbers(column, sided=True)
     if values is None:
         return False
     by_size = unit_by_size(values, "t").unit
@@ -321,7 +388,7 @@ def _even_column(table: LogTable, free: list[str]) -> ColumnGuess | None:
     """A column without a known name that increases evenly, as time does."""
     numbers_of_rows = ("", "index", "row", "no", "nr", "id", "seq", "sample")
     for column in free:
-        values = table.numbers_if_all(column, sided=True)
+        values = table.likely_numbers(column, sided=True)
         if values is None or values.size < 10:
             continue
         steps = np.diff(values)
@@ -352,7 +419,8 @@ def _forms(column: str, channel: str) -> list[str]:
     is_path = re.search(r"[^\W\d_][./:][^\W\d_]", column)
     if is_path and " " not in column:
         last = re.split(r"[./:]", text)[-1]
-        forms.append(_plain(last))
+        if len(last) > 1 or not _OF_TURNS.search(text):
+            forms.append(_plain(last))
     return forms
 
 

@@ -2,6 +2,7 @@
 
 import re
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,21 +20,27 @@ _PROPELLER = re.compile(
     r"|rev|power|duty"
 )
 _SERVO = re.compile(
-    r"(rcou|rc_?out|servo|pwm|ch|chan|channel|output|out).*\d(_?raw)?"
+    r"(C\d+)|(rcou|rc_?out|servo|pwm|ch|chan|channel|output|out).*\d(_?raw)?"
     r"|.*(steer|rudder|helm|pwm).*",
     re.IGNORECASE,
 )
 _NEUTRAL, _SPAN = 1500.0, 400.0  # us, of radio control's servos
 
-#: A column, why it steers, and the other keys of its declaration.
-Command = tuple[str, str, dict[str, str | float]]
+
+class Command(NamedTuple):
+    """Column of a steering command, as the declaration of a rudder has it."""
+
+    column: str
+    unit: str
+    reason: str
+    extra: tuple[tuple[str, str | float], ...]  # other keys of the declaration
 
 
 def steering_command(table: LogTable, free: list[str]) -> Command | None:
     """Steering command in columns of no other channel, which are then not free."""
     numbers = {}
     for column in free:
-        values = table.numbers_if_all(column)
+        values = table.likely_numbers(column)
         if values is None:
             continue
         known = values[np.isfinite(values)]
@@ -41,9 +48,8 @@ def steering_command(table: LogTable, free: list[str]) -> Command | None:
             numbers[column] = known
     command = _two_propellers(numbers) or _servo(numbers)
     if command is not None:
-        column, _, keys = command
-        for used in {column, keys.get("minus")} & set(free):
-            free.remove(str(used))
+        used = {command.column, dict(command.extra).get("minus")}
+        free[:] = [column for column in free if column not in used]
     return command
 
 
@@ -58,6 +64,8 @@ def _two_propellers(numbers: dict[str, Floats]) -> Command | None:
         if len(sides) == 2 and _PROPELLER.search(rest):
             port, starboard = sides["port"], sides["starboard"]
             both = np.concatenate([numbers[port], numbers[starboard]])
+            if _turn_alike(numbers[port], numbers[starboard]):
+                continue
             full = 2.0 * _SPAN
             if not _is_pulse_width(both):
                 full = float(f"{2.0 * float(np.mean(np.abs(both))):.2g}") or 1.0
@@ -70,7 +78,15 @@ def _difference(first: str, second: str, words: str, full: float) -> Command:
         f"steering command: '{first}' minus '{second}', {words} counts as"
         f" {FULL_RUDDER_DEG:g} deg of a nominal rudder"
     )
-    return first, reason, {"minus": second, "full": full}
+    return Command(first, "deg", reason, (("minus", second), ("full", full)))
+
+
+def _turn_alike(port: Floats, starboard: Floats) -> bool:
+    """Return whether two propellers never differ by more than a hundredth."""
+    if port.size != starboard.size:
+        return True
+    largest = np.abs(np.concatenate([port, starboard])).max()
+    return bool(np.ptp(port - starboard) < 0.01 * largest)
 
 
 def _side(column: str) -> tuple[str, str]:
@@ -97,7 +113,7 @@ def other_rudder(table: LogTable, column: str, free: list[str]) -> str | None:
             are_sides = side != other_side and rest == other_rest
         if not are_sides:
             continue
-        both = [table.numbers_if_all(name, sided=True) for name in (column, other)]
+        both = [table.likely_numbers(name, sided=True) for name in (column, other)]
         moved = [np.ptp(one[np.isfinite(one)]) for one in both if one is not None]
         if len(moved) == 2 and min(moved) > 0.1 * max(moved):
             return other
@@ -107,10 +123,14 @@ def other_rudder(table: LogTable, column: str, free: list[str]) -> str | None:
 def _servo(numbers: dict[str, Floats]) -> Command | None:
     """The first pulse width that a servo of radio control gets.
 
-    Of two motors of which one goes up where the other goes down it is the difference.
+    ArduPilot's ``SteerOut`` is a command up to 4500. Of two motors of which one goes up
+    where the other goes down it is the difference.
     """
     servos = {}
     for column, values in numbers.items():
+        if re.fullmatch(r"(.*\.)?SteerOut", column):
+            reason = "steering command of ArduPilot, of which 4500 is the full one"
+            return Command(column, "deg", reason, (("full", 4500.0),))
         if _SERVO.fullmatch(column) and _is_pulse_width(values):
             servos[column] = values
     for (left, a), (right, b) in combinations(servos.items(), 2):
@@ -123,7 +143,8 @@ def _servo(numbers: dict[str, Floats]) -> Command | None:
         f"steering command: a pulse width in us, neutral at {_NEUTRAL:g}, of which"
         f" {_SPAN:g} counts as {FULL_RUDDER_DEG:g} deg of a nominal rudder"
     )
-    return next(iter(servos)), reason, {"neutral": _NEUTRAL, "full": _SPAN}
+    extra = (("neutral", _NEUTRAL), ("full", _SPAN))
+    return Command(next(iter(servos)), "deg", reason, extra)
 
 
 def _is_pulse_width(values: Floats) -> bool:

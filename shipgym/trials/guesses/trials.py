@@ -1,6 +1,6 @@
 """Logs read with guessed columns and conventions, corrected by what checks propose."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -8,15 +8,17 @@ from typing import Any, NamedTuple
 from shipgym.checks import quoted, shown
 from shipgym.errors import InputError
 from shipgym.trials.conventions import Conventions, Installation
+from shipgym.trials.guesses.attitudes import frame_by_names
 from shipgym.trials.guesses.columns import ColumnGuess, guess_columns
 from shipgym.trials.guesses.speeds import settle_speeds
+from shipgym.trials.guesses.units import UNKNOWN
 from shipgym.trials.readers.cell_texts import number_with_side
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.rudder_sign import rudder_sign
 from shipgym.trials.trial import Trial, trial_of
 from shipgym.trials.trial_import import import_tables
-from shipgym.trials.units import QUANTITIES
+from shipgym.trials.units import QUANTITIES, si_unit
 
 #: What a message names that is cured by a line of the ship file.
 _CURABLE = ("[columns]", "[conventions]", "[sensors]", "declare ", "column = ")
@@ -104,12 +106,18 @@ def guess_trial(path: str | Path) -> TrialGuess:
     """
     table = read_log(path)
     columns: dict[str, ColumnGuess] = {}
+    decisions: list[Decision] = []
     knows_channels = bool(table.units) and table.cells.keys() <= QUANTITIES.keys()
     if not knows_channels:
         columns = {guess.channel: guess for guess in guess_columns(table)}
+        decisions = _unknown_units(columns)
         columns = settle_speeds(table, columns)
-    decisions = [] if knows_channels else _missing_columns(table, columns)
+        asked = {one.key for one in decisions}
+        decisions += _missing_columns(table, columns, asked)
     conventions: dict[str, ConventionGuess] = {}
+    east = frame_by_names({name: one.column for name, one in columns.items()})
+    if east is not None:
+        conventions["frame"] = ConventionGuess("frame", "enu", east)
     tried: set[tuple[str, str]] = set()
     trial = None
     while trial is None and not any(one.section != "sensors" for one in decisions):
@@ -125,7 +133,7 @@ def guess_trial(path: str | Path) -> TrialGuess:
             if name in columns:
                 columns[name] = _with_unit(columns[name], value)
             else:
-                reason = "without it a log is refused"
+                reason = "without it the log is refused"
                 conventions[name] = ConventionGuess(name, value, reason)
 
     side = None
@@ -181,18 +189,40 @@ def _unused(table: LogTable, columns: Mapping[str, ColumnGuess]) -> list[str]:
     for guess in columns.values():
         used.add(guess.column)
         for _, value in guess.extra:
-            used.add(str(value))
+            used.update(value if isinstance(value, tuple) else [str(value)])
     known = used or QUANTITIES.keys()
     return [name for name in table.header if name not in known]
 
 
+def _unknown_units(columns: dict[str, ColumnGuess]) -> list[Decision]:
+    """Take out columns whose unit is not known; decisions on those that matter."""
+    matter = ("t", "psi", "r", "delta", "delta_command", "sog", "stw", "u")
+    decisions = []
+    for channel, guess in list(columns.items()):
+        if guess.unit != UNKNOWN:
+            continue
+        del columns[channel]
+        if channel not in matter:
+            continue
+        unit = si_unit(channel)
+        line = f'{{ column = {guess.quoted}, unit = "{unit}" }} where that is its unit'
+        if channel in ("delta", "delta_command"):
+            line = (
+                f"{{ column = {guess.quoted}, full = 100 }} where 100 of it are 35 deg"
+                " of rudder"
+            )
+        choices = f"column {guess.quoted}, whose unit {guess.reason}: {line}"
+        decisions.append(Decision("columns", channel, choices))
+    return decisions
+
+
 def _missing_columns(
-    table: LogTable, columns: Mapping[str, ColumnGuess]
+    table: LogTable, columns: Mapping[str, ColumnGuess], asked: Collection[str]
 ) -> list[Decision]:
     """Decisions on columns without which a log shows no motion."""
     wanted = {"t": "time"}
     of_motion = {"psi", "r", "x", "lat", "u"}
-    if not of_motion & columns.keys():
+    if not of_motion & {*columns, *asked}:
         wanted["psi"] = "heading"
         if "delta" not in columns:
             wanted["delta"] = "rudder angle"
@@ -200,7 +230,7 @@ def _missing_columns(
     free = [name for name in table.header if name not in used]
     missing = []
     for channel, words in wanted.items():
-        if channel not in columns:
+        if channel not in columns and channel not in asked:
             unit = "s" if channel == "t" else "deg"
             choices = (
                 f"the column of the {words}, one of {quoted(free)[:1000]}, as"

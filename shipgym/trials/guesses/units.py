@@ -1,12 +1,19 @@
 """Units of columns, by the ends of their names and by the size of their values."""
 
+import re
 from typing import NamedTuple
 
 import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.trials.clock_texts import unit_since_1970
-from shipgym.trials.units import QUANTITIES, UNITS, si_unit, unit_of_channel
+from shipgym.trials.units import (
+    QUANTITIES,
+    UNITS,
+    si_unit,
+    spelled_units,
+    unit_of_channel,
+)
 
 #: Size from which on a channel or quantity is not in SI units, and the unit that it has
 #: then.
@@ -20,6 +27,22 @@ _BY_SIZE = {
 }
 #: Days from 1954 to 2119 in spreadsheets, from 1916 in MATLAB.
 _DAYS = {"excel days": (20_000.0, 80_000.0), "matlab days": (7e5, 8e5)}
+
+
+#: Stands for a unit that is none of those which are known.
+UNKNOWN = "?"
+#: What stands in brackets behind a name and is no unit.
+_QUALIFIERS = re.compile(
+    r"\W*|[a-z]|true|mag(netic)?|port|st(ar)?b(oar)?d|left|right|[spnew]\+|\+.*|gps|gnss"
+    r"|imu|ins|gyro|log|utc.*|gmt.*|local.*|lt|avg|mean|min|max|raw|act(ual)?|ist|soll"
+    r"|feedback|order|set|body|earth|ground|water|north|east|main|\d+|iso.*"
+    r"|[ymdhs:./ -]+|.*(over|through|water|ground|north).*|unitless|none|string|float.*"
+)
+#: Units that a name may have in round brackets too.
+_FOREIGN = re.compile(
+    r".*[%‰/].*|gon|mils?|percent|pct|prozent|counts?|ticks|steps|turns|m?v|ma|bits?"
+    r"|bft|beaufort|yds?|yards|cables?"
+)
 
 
 class UnitGuess(NamedTuple):
@@ -42,6 +65,16 @@ def named_unit(
     if unit is None:
         return None
     return UnitGuess(unit, reason)
+
+
+def unknown_unit(name: str) -> str | None:
+    """Text in brackets at the end of a name that is a unit, but none that is known."""
+    match = re.search(r"([\[(])\s*([^\[\]()]*?)\s*[\])]\s*$", name)
+    if match is None or spelled_units(match[2]):
+        return None
+    is_unit = _FOREIGN.fullmatch(match[2]) is not None
+    is_square = match[1] == "[" and not _QUALIFIERS.fullmatch(match[2])
+    return match[2] if is_unit or is_square else None
 
 
 def names_another_quantity(units: list[str], channel: str) -> bool:

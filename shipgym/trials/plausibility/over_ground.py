@@ -8,7 +8,7 @@ import numpy.typing as npt
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
-from shipgym.trials.conventions import Installation
+from shipgym.trials.conventions import Conventions
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.instrument_offsets import heading_offset, straight_parts
 from shipgym.trials.resampling import Log
@@ -29,7 +29,7 @@ def velocity_over_ground(log: Log) -> npt.NDArray[np.complex128]:
 
 
 def check_over_ground(
-    log: Log, installation: Installation, locator: Locator
+    log: Log, conventions: Conventions, locator: Locator
 ) -> list[str]:
     """Refuse a ship at berth, and a heading that contradicts the course over ground.
 
@@ -49,12 +49,31 @@ def check_over_ground(
     moving = speed > 0.3 * fastest  # a slow ship has no course
     if "psi" not in log.channels or np.count_nonzero(moving) < 3:
         return []
-    is_known = bool(installation.heading_offset)
+    is_known = bool(conventions.installation.heading_offset)
     psi = log.channels["psi"][moving]
-    fault = _heading_fault(psi, np.angle(velocity[moving]), offset_is_known=is_known)
+    course = np.angle(velocity[moving])
+    other = "ned" if conventions.frame == "enu" else "enu"
+    if _counts_from_east(psi, course):
+        raise InputError(
+            f"{locator.path}: expected a heading that turns as the course over ground,"
+            f" got one that turns the other way, and is its mirror image about"
+            f' north-east; write frame = "{other}" in [conventions], the frame of its'
+            " angles",
+            [("frame", other)],
+        )
+    fault = _heading_fault(psi, course, offset_is_known=is_known)
     if fault:
         raise InputError(f"{locator.path}: expected a heading {fault}")
     return [] if is_known else check_compass(log, locator)
+
+
+def _counts_from_east(psi: Floats, course: Floats) -> bool:
+    """Return whether a heading counts from east to port, by the course in rad."""
+    mirrored = np.exp(1j * (course + psi - 0.5 * math.pi)).mean()
+    agreement = abs(np.exp(1j * (course - psi)).mean())
+    is_turning = np.ptp(psi) > 20.0 * DEGREE
+    is_mirrored = abs(mirrored) > max(0.95, agreement + 0.02)
+    return bool(is_turning and is_mirrored and abs(np.angle(mirrored)) < 0.4)
 
 
 def _heading_fault(psi: Floats, course: Floats, *, offset_is_known: bool) -> str:

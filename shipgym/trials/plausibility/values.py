@@ -9,6 +9,7 @@ from shipgym.arrays import Flags, Floats
 from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
 from shipgym.trials.plausibility.agreement import likelier_time_units
+from shipgym.trials.resampling import usual_step
 from shipgym.trials.units import (
     DEGREE,
     LARGEST_MAGNITUDES,
@@ -106,11 +107,15 @@ def check_heading(t: Floats, psi: Floats, logged: Floats, locator: Locator) -> N
     which many are too fast, do not. Time in s, heading without jumps at north and as
     logged in rad, each of shape (n_samples,).
     """
-    fastest_turn = 60.0 * DEGREE
+    fastest_turn = 80.0 * DEGREE  # per second, of a small model
+    fastest_jump = 60.0 * DEGREE
     several_turns = np.abs(np.diff(logged)) > _TURN_AND_JUMP
     steps = np.abs(np.diff(psi))
-    is_fast = steps > fastest_turn * np.diff(t)
-    jumps = is_fast & (steps > _LARGEST_JUMP)
+    jumps = (steps > fastest_jump * np.diff(t)) & (steps > _LARGEST_JUMP)
+    is_fast = np.zeros(steps.size, dtype=bool)
+    rows = math.ceil(0.1 / usual_step(t))  # beyond the noise of quick rows
+    turned = np.abs(psi[rows:] - psi[:-rows])
+    is_fast[: turned.size] = turned > fastest_turn * (t[rows:] - t[:-rows])
     if several_turns.any():
         wrong = several_turns
     elif is_fast.mean() > 0.05:
@@ -144,7 +149,7 @@ def _too_fast_turn(
     before = locator.in_file("psi", logged[k])
     after = locator.in_file("psi", logged[k + 1])
     return InputError(
-        f"{locator.place(k + 1, 'psi')}: expected a heading that turns by at most 60"
+        f"{locator.place(k + 1, 'psi')}: expected a heading that turns by at most 80"
         f" deg/s, got {before} and then {after} within {t[k + 1] - t[k]:g} s; {remedy}",
         proposals,
     )

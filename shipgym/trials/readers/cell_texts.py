@@ -65,6 +65,9 @@ class Measured(NamedTuple):
 def number_with_unit(text: str) -> Measured | None:
     """Number and unit of a text such as "13.6 kn"; None for others."""
     match = _WITH_UNIT.fullmatch(text)
-    if match is None or not spelled_units(match[2].lower()):
+    if match is None:
+        return None
+    is_true = match[2] == "T"  # a bearing from true north
+    if not is_true and not spelled_units(match[2].lower()):
         return None
     return Measured(float(match[1]), match[2])

@@ -3,7 +3,7 @@
 import io
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,7 +19,7 @@ from shipgym.trials.readers.layout import (
     unit_texts,
     without_spare,
 )
-from shipgym.trials.readers.log_table import LogTable
+from shipgym.trials.readers.log_table import ODD_SHARE, LogTable
 from shipgym.trials.readers.text_files import text_lines
 
 _LONGEST_LINE = 100_000  # characters
@@ -49,7 +49,6 @@ def read_csv(path: Path, content: bytes) -> LogTable:
     while len(header) > 2 and not header[-1]:
         header.pop()
     header_at = layout.header + 1
-    _check_header(path, header, header_at)
 
     notes = []
     if encoding:
@@ -59,43 +58,80 @@ def read_csv(path: Path, content: bytes) -> LogTable:
     unit_rows = [split(lines[number], delimiter) for number in layout.units]
     body = _find_rows(path, lines, layout, len(header))
     columns = _columns(list(body.lines.values()), delimiter, len(header))
+    notes += _drop_stuck_doubles(header, columns)
+    _check_header(path, header, header_at)
     return LogTable(
         path=path,
         cells=dict(zip(header, columns, strict=True)),
         rows=list(body.lines),
         place_words="line {line} (data row {row})",
-        decimal_comma=delimiter != ",",
+        decimal_comma=delimiter != "," or _has_quoted_commas(lines),
         unit_row=unit_texts(header, unit_rows),
         notes=(*notes, *body.notes),
     )
 
 
 def _find_rows(path: Path, lines: Sequence[str], layout: Layout, n_cells: int) -> _Body:
-    """Rows below the names, without blank lines, names again and units."""
+    """Rows below the names, without blank lines, names again and units.
+
+    Rows that lack cells at their end are completed where many do; a few that do not fit
+    are left out.
+    """
     delimiter = layout.delimiter
     names = lines[layout.header].strip()
     blank = delimiter + " \t"
     rows: dict[int, str] = {}
+    lacking: dict[int, int] = {}  # cells by line, less than none where there are more
     notes = []
     for number, line in enumerate(lines[layout.header + 1 :], start=layout.header + 1):
         is_names = line.strip() == names
         if number in layout.units or is_names or not line.strip(blank):
             continue
-        found = len(without_spare(split(line, delimiter), n_cells))
-        if found < n_cells and rows:
-            is_cut = number == len(lines) - 1
-            if is_cut or not is_data(split(line, delimiter)):
-                left_out = "is cut short" if is_cut else "is no row of the table"
-                notes.append(f"line {number + 1} {left_out} and is left out")
-                continue
+        cells = split(line, delimiter)
+        found = len(without_spare(cells, n_cells))
+        is_last = number == len(lines) - 1
+        is_remark = found < n_cells and not is_data(cells)
+        if rows and (is_remark or (is_last and found < n_cells)):
+            left_out = "is cut short" if is_last else "is no row of the table"
+            notes.append(f"line {number + 1} {left_out} and is left out")
+            continue
         rows[number + 1] = line
         if found != n_cells:
-            raise InputError(
-                f"{path}: line {number + 1} (data row {len(rows)}): expected"
-                f" {n_cells} cells as in the header, got {found}; complete or"
-                " remove the row"
-            )
+            lacking[number + 1] = n_cells - found
+    if lacking:
+        notes.append(_settle_lacking(path, rows, lacking, delimiter, n_cells))
     return _Body(rows, notes)
+
+
+def _settle_lacking(
+    path: Path,
+    rows: dict[int, str],
+    lacking: Mapping[int, int],
+    delimiter: str,
+    n_cells: int,
+) -> str:
+    """Complete rows that lack cells, or leave a few odd ones out; a note of it.
+
+    A recorder that leaves out blank cells at the end writes many short rows. InputError
+    for many rows that do not fit otherwise.
+    """
+    first = next(iter(lacking))
+    count = len(lacking)
+    words = f"{count} of {len(rows)} rows, from line {first} on,"
+    if count <= ODD_SHARE * len(rows):
+        for line in lacking:
+            del rows[line]
+        return f"{words} have other numbers of cells than the header: left out"
+    has_quotes = any('"' in rows[line] for line in lacking)
+    if min(lacking.values()) > 0 and delimiter != BLANKS and not has_quotes:
+        for line, missing in lacking.items():
+            rows[line] += delimiter * missing
+        return f"{words} lack cells at their end, which are taken as missing"
+    row = list(rows).index(first) + 1
+    raise InputError(
+        f"{path}: line {first} (data row {row}): expected {n_cells} cells as in the"
+        f" header, got {n_cells - lacking[first]}; complete or remove the row"
+    )
 
 
 def _columns(rows: list[str], delimiter: str, n_cells: int) -> list[Any]:
@@ -128,6 +164,30 @@ def _columns(rows: list[str], delimiter: str, n_cells: int) -> list[Any]:
             texts = column.astype(object).where(column.notna(), "")
             columns.append([str(cell) for cell in texts])
     return columns
+
+
+def _has_quoted_commas(lines: Sequence[str]) -> bool:
+    """Return whether quoted numbers have a decimal comma, not one of thousands."""
+    text = "\n".join(lines[:200])
+    commas = re.findall(r'"[-+]?\d+,(\d+)"', text)
+    has_points = re.search(r"\d\.\d", text) is not None
+    return not has_points and any(len(digits) != 3 for digits in commas)
+
+
+def _drop_stuck_doubles(header: list[str], columns: list[Any]) -> list[str]:
+    """Leave out columns of a repeated name that stand still; notes of them."""
+    notes = []
+    for name, count in Counter(header).items():
+        if count < 2 or not name:
+            continue
+        places = [k for k, one in enumerate(header) if one == name]
+        stuck = [k for k in places if len({*map(str, columns[k])}) == 1]
+        if len(stuck) != count - 1:
+            continue
+        for k in reversed(stuck):
+            del header[k], columns[k]
+        notes.append(f"of {count} columns '{name}' those that stand still are left out")
+    return notes
 
 
 def _check_text(path: Path, lines: Sequence[str]) -> None:

@@ -1,11 +1,11 @@
 """A log as a table of named columns, which every reader returns."""
 
-import math
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,24 @@ from shipgym.trials.readers.cell_texts import (
     number_with_side,
     number_with_unit,
 )
+
+#: The setting with which missing values are filled.
+REPAIR = ("repair", "interpolate")
+#: Share of the cells of a column that may be no numbers, as a footer or a remark.
+ODD_SHARE = 0.05
+
+
+class _Parsed(NamedTuple):
+    """A column as numbers, and the rows whose cells are none."""
+
+    numbers: Floats
+    odd: list[int]
+
+    @property
+    def is_likely(self) -> bool:
+        """True if nearly all cells with something are numbers."""
+        known = np.count_nonzero(np.isfinite(self.numbers))
+        return bool(len(self.odd) <= ODD_SHARE * known)
 
 
 @dataclass(frozen=True)
@@ -58,6 +76,9 @@ class LogTable:
     notes: tuple[str, ...] = ()
     own_clocks: bool = False
     magnetic: bool = False
+    _parsed: dict[tuple[str, bool], _Parsed] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     @property
     def header(self) -> tuple[str, ...]:
@@ -99,26 +120,83 @@ class LogTable:
         With `sided`, "S10.0" and "10 PORT" are 10 to starboard, which is positive, and
         to port. Raises InputError for other text.
         """
+        parsed = self._parse(name, sided=sided)
+        if parsed.odd:
+            raise self._no_number(parsed.odd[0], name)
+        return parsed.numbers.copy()
+
+    def likely_numbers(self, name: str, *, sided: bool = False) -> Floats | None:
+        """A column as numbers, nan for the odd cell with other text.
+
+        None where other texts are more than a few.
+        """
+        parsed = self._parse(name, sided=sided)
+        return parsed.numbers.copy() if parsed.is_likely else None
+
+    def without_odd_cells(self, names: Sequence[str], time: str) -> "LogTable":
+        """The table without the few cells of some columns that are no numbers.
+
+        A row whose `time` is odd is left out. The notes name what was left out.
+        """
+        cells = dict(self.cells)
+        notes = []
+        for name in names:
+            parsed = self._parse(name, sided=True)
+            if name == time or not parsed.odd or not parsed.is_likely:
+                continue
+            column = list(cells[name])
+            first = str(column[parsed.odd[0]]).strip()
+            for row in parsed.odd:
+                column[row] = ""
+            cells[name] = column
+            place = self.cell(parsed.odd[0], name)
+            notes.append(f"{place}: {first!r} is no number{_and_more(parsed.odd)}")
+        whole = replace(self, cells=cells, notes=(*self.notes, *notes))
+        return whole._without_odd_times(time)
+
+    def _without_odd_times(self, name: str) -> "LogTable":
+        """The table without the few rows that have no time, as a footer."""
+        odd = self._parse(name, sided=False).odd
+        texts = self.texts(name)
+        if len(odd) > ODD_SHARE * len(texts):  # clock times
+            odd = [row for row, text in enumerate(texts) if text and not _DIGIT(text)]
+        odd += [row for row, text in enumerate(texts) if not text]
+        if not 0 < len(odd) <= max(1.0, ODD_SHARE * len(texts)):
+            return self
+        left_out = set(odd)
+        kept = [row for row in range(len(texts)) if row not in left_out]
+        cells = {}
+        for other, column in self.cells.items():
+            is_array = isinstance(column, np.ndarray)
+            cells[other] = column[kept] if is_array else [column[k] for k in kept]
+        place = self.cell(min(odd), name)
+        found = texts[min(odd)] or "nothing"
+        note = f"{place}: {found!r} is no time, the row is left out{_and_more(odd)}"
+        rows = [self.rows[k] for k in kept]
+        return replace(self, cells=cells, rows=rows, notes=(*self.notes, note))
+
+    def _parse(self, name: str, *, sided: bool) -> _Parsed:
+        """Numbers of a column and its odd rows, worked out once."""
+        key = (name, sided)
+        if key not in self._parsed:
+            self._parsed[key] = self._parse_cells(name, sided=sided)
+        return self._parsed[key]
+
+    def _parse_cells(self, name: str, *, sided: bool) -> _Parsed:
         cells = self.column(name)
         if isinstance(cells, np.ndarray) and cells.dtype.kind in "fiub":
-            return np.asarray(cells, dtype=np.float64)
+            return _Parsed(np.asarray(cells, dtype=np.float64), [])
         with suppress(ValueError, TypeError, OverflowError):
-            return np.array([_plain_number(cell) for cell in cells])
+            return _Parsed(np.array([_plain_number(cell) for cell in cells]), [])
         numbers = np.full(len(cells), np.nan)
+        odd = []
         for row, text in enumerate(self.texts(name)):
-            if text:
-                number = self._number(text, sided=sided)
-                if number is None:
-                    raise self._no_number(row, name, text)
+            number = self._number(text, sided=sided) if text else np.nan
+            if number is None:
+                odd.append(row)
+            else:
                 numbers[row] = number
-        return numbers
-
-    def numbers_if_all(self, name: str, *, sided: bool = False) -> Floats | None:
-        """A column as numbers; None where :meth:`numbers` refuses one of its cells."""
-        try:
-            return self.numbers(name, sided=sided)
-        except InputError:
-            return None
+        return _Parsed(numbers, odd)
 
     def _number(self, text: str, *, sided: bool) -> float | None:
         """A number, with a side or a unit or neither; None for other text."""
@@ -134,16 +212,27 @@ class LogTable:
         with_unit = number_with_unit(text)
         return with_unit.number if with_unit else None
 
-    def _no_number(self, row: int, name: str, text: str) -> InputError:
+    def _no_number(self, row: int, name: str) -> InputError:
         place = self.cell(row, name)
+        text = self.texts(name)[row]
         return InputError(
             f"{place}: expected a number, got '{text}'; correct the cell, or leave it"
-            ' empty where the value is missing and import with repair = "interpolate"'
+            ' out and fill it from its neighbours with repair = "interpolate"',
+            [REPAIR],
         )
+
+
+_DIGIT = re.compile(r"\d").search
+
+
+def _and_more(rows: Sequence[int]) -> str:
+    """How many more rows a note is about."""
+    more = len(rows) - 1
+    return f", as in {more} more" if more else ""
 
 
 def _plain_number(cell: Any) -> float:
     """Number of a cell that is plainly written or empty; ValueError for others."""
     if "_" in str(cell):
         raise ValueError("an underscore, which Python reads in a number")
-    return math.nan if cell == "" else float(cell)
+    return np.nan if cell == "" else float(cell)
