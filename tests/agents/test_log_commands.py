@@ -135,7 +135,9 @@ def test_every_column_of_the_examples_log_is_recognised_in_its_unit(
     ],
 )
 def test_a_name_is_a_channels_where_its_unit_is_one_of_it(name, channel, unit):
-    found = guess_columns(LogTable(Path("log"), {name: np.zeros(3)}, range(3)))
+    found = guess_columns(
+        LogTable(Path("log"), {name: np.array([0.0, 0.1, 0.2])}, range(3))
+    )
     assert [(one.channel, one.unit) for one in found] == (
         [(channel, unit)] if channel else []
     )
