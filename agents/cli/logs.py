@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Argument, Option
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from shipgym.trials.guesses import (
         ColumnGuess,
         ConventionGuess,
@@ -197,7 +199,7 @@ def _entry(
     known = {(one.channel, one.declaration) for one in shared}
     own = [one for one in guess.columns if (one.channel, one.declaration) not in known]
     return {
-        "file": _toml_path(guess.path, folder),
+        "file": _toml_paths(guess.paths, folder),
         "columns": own,
         "decision": next(iter(of_trial), None),
     }
@@ -212,11 +214,17 @@ def _columns(guessed: TrialGuess) -> dict[str, Any]:
 
 
 def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
-    """Logs read with guessed columns; the first has to be readable."""
+    """Logs read with guessed columns; the first has to be readable.
+
+    Files of which none steers and turns, but which do together, are one log.
+    """
     from agents.cli.terminal import warn
     from shipgym.errors import InputError
     from shipgym.trials.guesses import guess_trial
 
+    joined = _joined(logs)
+    if joined is not None:
+        return [joined]
     guessed = [guess_trial(logs[0])]
     for log in logs[1:]:
         try:
@@ -224,6 +232,25 @@ def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
         except InputError as error:
             warn(f"{error}; left out of the ship file")
     return guessed
+
+
+def _joined(logs: list[Path]) -> TrialGuess | None:
+    """Files as one log where only all of them together steer and turn; or None."""
+    from shipgym.errors import InputError
+    from shipgym.trials.guesses import guess_columns, guess_trial
+    from shipgym.trials.readers.kinds import read_log
+
+    if len(logs) < 2:
+        return None
+    try:
+        found = [{one.channel for one in guess_columns(read_log(log))} for log in logs]
+        if any(one & _STEERING and one & _TURNING for one in found):
+            return None
+        joined = guess_trial(*logs)
+    except InputError:
+        return None
+    is_whole = _has(joined, _STEERING) and _has(joined, _TURNING)
+    return joined if is_whole and joined.trial is not None else None
 
 
 def _service_speed(guessed: list[TrialGuess]) -> float | None:
@@ -237,9 +264,11 @@ def _service_speed(guessed: list[TrialGuess]) -> float | None:
     return max(speeds, default=None)
 
 
-def _toml_path(path: Path, folder: Path) -> str:
-    """A path relative to a folder, as a text of TOML."""
-    return json.dumps(os.path.relpath(path, folder), ensure_ascii=False)
+def _toml_paths(paths: Sequence[Path], folder: Path) -> str:
+    """Paths relative to a folder: a text of TOML, or a list of several."""
+    relative = [os.path.relpath(path, folder) for path in paths]
+    one_or_all = relative if len(relative) > 1 else relative[0]
+    return json.dumps(one_or_all, ensure_ascii=False)
 
 
 def look_command(

@@ -232,7 +232,12 @@ def search(
     cma: Any = library("cma", "tune", "searching settings needs it")
     began = time.process_time()
     first_step = 0.5  # of the steps of the settings
-    options = {"seed": 1 + seed, "verbose": -9, "popsize": _generation(space)}
+    options = {
+        "seed": 1 + seed,
+        "verbose": -9,
+        "popsize": _generation(space),
+        "signals_filename": None,  # no settings from files in the working folder
+    }
     strategy = cma.CMAEvolutionStrategy(np.zeros(len(space)), first_step, options)
     best = {setting.name: setting.start for setting in space}
     least = np.inf

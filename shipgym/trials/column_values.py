@@ -154,6 +154,11 @@ def _read_angles(table: LogTable, column: Column) -> Floats:
     ddmm.mmm as in NMEA 0183, as does the column's unit. Raises InputError for the first
     cell that is none of these.
     """
+    plain = table.plain_numbers(column.name)
+    if plain is not None and column.unit == "deg":
+        have_minutes = np.nanmax(np.abs(plain), initial=0.0) >= 1000.0
+        if not have_minutes:
+            return plain.copy()
     cells = table.texts(column.name)
     matches = [_ANGLE.fullmatch(cell) for cell in cells]
     has_minutes = column.unit != "deg" or any(

@@ -28,34 +28,51 @@ def _derivative(t_bytes: bytes, value_bytes: bytes) -> Floats:
     """Derivative of float64 values by their times, both as bytes."""
     from scipy.interpolate import make_interp_spline
 
-    fewest_spans = 8
-    # of noise, as a power of the distance of knots: that of a random walk has a half
-    steepest_growth = 0.8
     t = np.frombuffer(t_bytes)
     values = np.frombuffer(value_bytes)
     n = t.size
     since_start = t - t[0]
     step = since_start[-1] / (n - 1)
     samples = since_start / step
-    best = make_interp_spline(samples, values, k=min(3, n - 1))
+    part = _liveliest(values)
+    spacing = _widest_spacing(samples[part], values[part])
+    if spacing is None:
+        spline = make_interp_spline(samples, values, k=min(3, n - 1))
+    else:
+        spline, _ = _smoothed(samples, values, spacing)
+    derivative = spline.derivative()
+    return np.asarray(derivative(samples) / step, dtype=np.float64)
 
+
+def _liveliest(values: Floats) -> slice:
+    """The part of a long signal that changes most, by which its noise is told."""
+    longest = 20_000  # samples
+    begins = range(0, max(values.size - longest // 2, 1), longest)
+    parts = [slice(begin, begin + longest) for begin in begins]
+    return max(parts, key=lambda part: float(np.std(np.diff(values[part]))))
+
+
+def _widest_spacing(samples: Floats, values: Floats) -> int | None:
+    """Samples from knot to knot up to which the noise hardly grows; None without."""
+    fewest_spans = 8
+    # of noise, as a power of the distance of knots: that of a random walk has a half
+    steepest_growth = 0.8
+    widest = None
     noise_before = 0.0
     spacing_before = 0
     spacing = 2
-    while n // spacing >= fewest_spans:
-        spline, noise = _smoothed(samples, values, spacing)
+    while values.size // spacing >= fewest_spans:
+        _, noise = _smoothed(samples, values, spacing)
         if spacing_before:
             growth = math.log(noise / noise_before)
             widening = math.log(spacing / spacing_before)
             if growth > steepest_growth * widening:
                 break
-            best = spline
+            widest = spacing
         noise_before = noise
         spacing_before = spacing
         spacing = math.ceil(1.4 * spacing)
-
-    derivative = best.derivative()
-    return np.asarray(derivative(samples) / step, dtype=np.float64)
+    return widest
 
 
 def _smoothed(samples: Floats, values: Floats, spacing: int) -> tuple[Any, float]:

@@ -47,8 +47,13 @@ def read_times(table: LogTable, column: Column) -> RowTimes:
 
     Raises InputError for the first cell that is no time.
     """
-    cells = table.texts(column.name)
     is_week_time = column.unit.startswith("gps tow")
+    is_plain = table.plain_numbers(column.name) is not None
+    may_be_compact = _COMPACT.fullmatch(table.first_text(column.name)) is not None
+    if is_plain and column.date is None and not may_be_compact:
+        cells = [table.first_text(column.name)]  # the rest need not be read as texts
+    else:
+        cells = table.texts(column.name)
     if column.date is not None and not is_week_time:
         dates = table.texts(column.date)
         for row, date in enumerate(dates):

@@ -195,6 +195,7 @@ def test_sentences_of_one_second_stand_in_any_order(kinds, tmp_path):
             [],
         ),
         ((gll, lambda one: hdt(one, "GP"), lambda one: rsa(one, talker="SD")), []),
+        ((gll, lambda one: hdt(one, "17"), lambda one: rsa(one, talker="a5")), []),
         ((zda, hdt, rsa), ["no speed is known"]),
     ],
 )

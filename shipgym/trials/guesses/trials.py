@@ -1,6 +1,6 @@
 """Logs read with guessed columns and conventions, corrected by what checks propose."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -59,13 +59,18 @@ class Decision(NamedTuple):
 class TrialGuess:
     """A log, and the columns and conventions with which it could be read."""
 
-    path: Path
+    paths: tuple[Path, ...]  # several that were written at the same time are one log
     columns: list[ColumnGuess]
     conventions: list[ConventionGuess]  # those that are not the usual ones
     trial: Trial | None  # none where a decision is needed first
     unused: list[str]  # columns of which no channel was made
     side: RudderSide | None  # to which a positive rudder steers; none without one
     decisions: list[Decision] = field(default_factory=list)
+
+    @property
+    def path(self) -> Path:
+        """The file, or the first one."""
+        return self.paths[0]
 
     @property
     def column_names(self) -> list[str]:
@@ -97,23 +102,19 @@ class TrialGuess:
         return reading
 
 
-def guess_trial(path: str | Path) -> TrialGuess:
+def guess_trial(path: str | Path, *others: str | Path) -> TrialGuess:
     """Read a log with guesses; where a check proposes another setting, try that.
 
     A unit given in a column's name is kept unless the positions contradict it. What a
-    line of a ship file can cure is a decision. Raises InputError, as the readers do,
-    for other logs that cannot be read.
+    line of a ship file can cure is a decision. With `others`, files that were written
+    at the same time are read as one log, each channel from the file with most rows of
+    it. Raises InputError, as the readers do, for other logs that cannot be read.
     """
-    table = read_log(path)
+    tables = [read_log(one) for one in (path, *others)]
     columns: dict[str, ColumnGuess] = {}
     decisions: list[Decision] = []
-    knows_channels = bool(table.units) and table.cells.keys() <= QUANTITIES.keys()
-    if not knows_channels:
-        columns = {guess.channel: guess for guess in guess_columns(table)}
-        decisions = _unknown_units(columns)
-        columns = settle_speeds(table, columns)
-        asked = {one.key for one in decisions}
-        decisions += _missing_columns(table, columns, asked)
+    if not all(_knows_channels(table) for table in tables):
+        columns, decisions = _guess_tables(tables)
     conventions: dict[str, ConventionGuess] = {}
     east = frame_by_names({name: one.column for name, one in columns.items()})
     if east is not None:
@@ -122,7 +123,7 @@ def guess_trial(path: str | Path) -> TrialGuess:
     trial = None
     while trial is None and not any(one.section != "sensors" for one in decisions):
         try:
-            trial = _read(table, columns, conventions, decisions)
+            trial = _read(tables, columns, conventions, decisions)
         except InputError as error:
             proposal = _next_proposal(error, columns, tried)
             if proposal is None:
@@ -141,25 +142,50 @@ def guess_trial(path: str | Path) -> TrialGuess:
         conventions = {}
     else:
         is_turned = "rudder_positive" in conventions
-        side = _rudder_side(table, trial, columns.get("delta"), is_turned=is_turned)
+        side = _rudder_side(tables, trial, columns.get("delta"), is_turned=is_turned)
         if side is not None and side.side == "port" and not is_turned:
             turned = ConventionGuess("rudder_positive", "port", side.reason)
             conventions["rudder_positive"] = turned
-            trial = _read(table, columns, conventions, decisions)
+            trial = _read(tables, columns, conventions, decisions)
         conventions.pop("rudder_positive", None)
     return TrialGuess(
-        path=table.path,
+        paths=tuple(table.path for table in tables),
         columns=list(columns.values()),
         conventions=list(conventions.values()),
         trial=trial,
-        unused=_unused(table, columns),
+        unused=[name for table in tables for name in _unused(table, columns)],
         side=side,
         decisions=decisions,
     )
 
 
+def _knows_channels(table: LogTable) -> bool:
+    """Return whether a reader named the columns by their channels, with units."""
+    return bool(table.units) and table.cells.keys() <= QUANTITIES.keys()
+
+
+def _guess_tables(
+    tables: Sequence[LogTable],
+) -> tuple[dict[str, ColumnGuess], list[Decision]]:
+    """Columns of all tables by channel, and what is left to decide."""
+    columns: dict[str, ColumnGuess] = {}
+    decisions: list[Decision] = []
+    by_density = sorted(tables, key=lambda table: len(table.rows), reverse=True)
+    for table in by_density:
+        found = {guess.channel: guess for guess in guess_columns(table)}
+        decisions += _unknown_units(found)
+        columns = settle_speeds(table, found) | columns
+    asked = {one.key for one in decisions}
+    decisions += _missing_columns(tables, columns, asked)
+    return columns, decisions
+
+
 def _rudder_side(
-    table: LogTable, trial: Trial, column: ColumnGuess | None, *, is_turned: bool
+    tables: Sequence[LogTable],
+    trial: Trial,
+    column: ColumnGuess | None,
+    *,
+    is_turned: bool,
 ) -> RudderSide | None:
     """Side of the rudder in a log that was read, `is_turned` with positive to port.
 
@@ -167,7 +193,9 @@ def _rudder_side(
     """
     if not {"psi", "delta"} <= trial.channels.keys():
         return None
-    if column is not None:
+    for table in tables:
+        if column is None or column.column not in table.cells:
+            continue
         first = table.first_text(column.column)
         if table.decimal_comma:
             first = first.replace(",", ".")
@@ -217,7 +245,9 @@ def _unknown_units(columns: dict[str, ColumnGuess]) -> list[Decision]:
 
 
 def _missing_columns(
-    table: LogTable, columns: Mapping[str, ColumnGuess], asked: Collection[str]
+    tables: Sequence[LogTable],
+    columns: Mapping[str, ColumnGuess],
+    asked: Collection[str],
 ) -> list[Decision]:
     """Decisions on columns without which a log shows no motion."""
     wanted = {"t": "time"}
@@ -227,7 +257,8 @@ def _missing_columns(
         if "delta" not in columns:
             wanted["delta"] = "rudder angle"
     used = {guess.column for guess in columns.values()}
-    free = [name for name in table.header if name not in used]
+    every = [name for table in tables for name in table.header]
+    free = [name for name in every if name not in used]
     missing = []
     for channel, words in wanted.items():
         if channel not in columns and channel not in asked:
@@ -253,7 +284,7 @@ def _decision(error: InputError, decisions: list[Decision]) -> Decision:
 
 
 def _read(
-    table: LogTable,
+    tables: Sequence[LogTable],
     guesses: Mapping[str, ColumnGuess],
     conventions: Mapping[str, ConventionGuess],
     decisions: list[Decision],
@@ -262,17 +293,17 @@ def _read(
     columns = {}
     for channel, guess in guesses.items():
         columns[channel] = guess.as_column
-    words: dict[str, Any] = {"where": f"{table.path}:"}
+    words: dict[str, Any] = {"where": f"{tables[0].path}:"}
     for one in conventions.values():
         words[one.name] = one.value
     if any(one.key == "clock_offsets" for one in decisions):
         words["installation"] = Installation(clock_offsets="keep")
     log = import_tables(
-        [table],
+        tables,
         columns or None,
         Conventions(**words),
     )
-    return trial_of(log, table.path.name)
+    return trial_of(log, " + ".join(table.path.name for table in tables))
 
 
 def _next_proposal(

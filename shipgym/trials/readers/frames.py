@@ -74,16 +74,45 @@ def read_parquet(path: Path, content: bytes) -> LogTable:
     with damage_reported(path, "Parquet", "it may be cut short: write it again"):
         arrow = import_module("pyarrow")
         parquet = import_module("pyarrow.parquet")
-        file = parquet.ParquetFile(arrow.BufferReader(content))
-        metadata = file.metadata
+        source = arrow.BufferReader(content)
+        metadata = parquet.read_metadata(source)
         groups = [metadata.row_group(k) for k in range(metadata.num_row_groups)]
         as_numbers = 8 * metadata.num_rows * metadata.num_columns
         as_declared = sum(group.total_byte_size for group in groups)
         check_unpacked(path, max(as_declared, as_numbers))
 
+        schema = parquet.read_schema(source)
+        texts = [field.name for field in schema if _is_text(field.type)]
+        # a text that many rows share stands once in the memory
+        file = parquet.ParquetFile(source, read_dictionary=texts)
         table = file.read()
         table.validate(full=True)  # offsets beyond the data
+        check_unpacked(path, sum(_unpacked(table[name]) for name in texts))
         return read_frame(table.to_pandas(), path, first=1)
+
+
+def _is_text(kind: Any) -> bool:
+    """Return whether a type of Arrow is one of texts or bytes."""
+    types = import_module("pyarrow.types")
+    if types.is_dictionary(kind):
+        kind = kind.value_type
+    return bool(
+        types.is_string(kind)
+        or types.is_large_string(kind)
+        or types.is_binary(kind)
+        or types.is_large_binary(kind)
+    )
+
+
+def _unpacked(column: Any) -> int:
+    """Bytes of a column of texts numbered in a dictionary, each written out."""
+    compute = import_module("pyarrow.compute")
+    size = 0
+    for chunk in column.chunks:
+        lengths = compute.binary_length(chunk.dictionary)
+        of_rows = compute.sum(lengths.take(chunk.indices)).as_py()
+        size += of_rows or 0
+    return size
 
 
 def read_excel(path: Path, content: bytes) -> LogTable:

@@ -30,7 +30,7 @@ _MAGIC = {b"PAR1": "parquet", b"MATLAB 5.0": "matlab", b"MATLAB 7.3": "matlab"}
 #: Sentences of NMEA 0183, deltas of Signal K and messages of NMEA 2000 at the beginning
 #: of a file.
 _MESSAGES = re.compile(
-    r"""^(?:[^\n]{0,200}[$!][A-Z][A-Z0-9]{3,4},
+    r"""^(?:[^\n]{0,200}[$!][A-Za-z0-9]{2}[A-Z]{3},
     |[^\n]{0,80}\{[^\n]*"updates""?:
     |[^\n]{0,80}\{[^\n]*"pgn":
     |[^\n]{0,30}\d{4}-\d\d-\d\d\S+(?:,\d,\d{5,6},|\s+\d\s+\d+\s+\d+\s+\d{5,6}\s)

@@ -104,6 +104,13 @@ class LogTable:
             )
         return self.cells[name]
 
+    def plain_numbers(self, name: str) -> Floats | None:
+        """A column that the reader knows as numbers; None for others."""
+        cells = self.column(name)
+        if isinstance(cells, np.ndarray) and cells.dtype.kind in "fiub":
+            return np.asarray(cells, dtype=np.float64)
+        return None
+
     def texts(self, name: str) -> list[str]:
         """Cells of a column as stripped texts, empty where there is no value."""
         texts = [str(cell).strip() for cell in self.column(name)]
@@ -156,6 +163,9 @@ class LogTable:
 
     def _without_odd_times(self, name: str) -> "LogTable":
         """The table without the few rows that have no time, as a footer."""
+        plain = self.plain_numbers(name)
+        if plain is not None and np.isfinite(plain).all():
+            return self
         odd = self._parse(name, sided=False).odd
         texts = self.texts(name)
         if len(odd) > ODD_SHARE * len(texts):  # clock times
@@ -183,9 +193,10 @@ class LogTable:
         return self._parsed[key]
 
     def _parse_cells(self, name: str, *, sided: bool) -> _Parsed:
+        plain = self.plain_numbers(name)
+        if plain is not None:
+            return _Parsed(plain, [])
         cells = self.column(name)
-        if isinstance(cells, np.ndarray) and cells.dtype.kind in "fiub":
-            return _Parsed(np.asarray(cells, dtype=np.float64), [])
         with suppress(ValueError, TypeError, OverflowError):
             return _Parsed(np.array([_plain_number(cell) for cell in cells]), [])
         numbers = np.full(len(cells), np.nan)

@@ -71,7 +71,7 @@ def _kind(entry: dict[str, Any]) -> _Kind:
 _TABLE = shipped_toml("shipgym.trials.readers", "nmea0183.toml")
 _KINDS = {name: _kind(entry) for name, entry in _TABLE.items()}
 _SENTENCE = re.compile(
-    rf"\$[A-Z][A-Z0-9](?:{'|'.join(_KINDS)}|XDR),[^$!\\\"\r\n*]*"
+    rf"\$[A-Za-z0-9]{{2}}(?:{'|'.join(_KINDS)}|XDR),[^$!\\\"\r\n*]*"
     r"(?:\*[^,;\s\"$!\\]{0,2})?"
 )
 
