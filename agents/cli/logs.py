@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _STEERING = frozenset({"delta", "delta_command"})
 _TURNING = frozenset({"psi", "r"})
+_HEADING = frozenset({"psi"})
 
 
 def new_ship_command(
@@ -86,13 +87,17 @@ def _facts(guessed: list[TrialGuess], out: Path) -> dict[str, Any]:
     """What the templates of ship file and summary say of the logs."""
     first, *_ = guessed
     side = _rudder_side(guessed)
+    speed = _service_speed(guessed)
+    has_rate_alone = not any(_has(one, _HEADING) for one in guessed)
+    are_read = any(one.trial is not None for one in guessed)
+    needs_speed = are_read and has_rate_alone and speed is None
     shared = _shared_columns(guessed)
     return {
         "out": out,
         "guessed": guessed,
         "shared": shared,
         "decisions": _decisions(guessed),
-        "to_decide": _to_decide(guessed, side),
+        "to_decide": _to_decide(guessed, side, needs_speed=needs_speed),
         "side": side,
         "no_rudder": not any(_has(one, _STEERING) for one in guessed),
         "can_identify": any(
@@ -102,7 +107,8 @@ def _facts(guessed: list[TrialGuess], out: Path) -> dict[str, Any]:
         "trial": first.trial,
         "trial_columns": first.columns,
         "unused": first.unused_names,
-        "speed": _service_speed(guessed),
+        "speed": speed,
+        "needs_speed": needs_speed,
         "files": [_entry(one, shared, out.parent) for one in guessed],
     }
 
@@ -181,9 +187,13 @@ def _decisions(guessed: list[TrialGuess]) -> dict[str, list[Decision]]:
     return decisions
 
 
-def _to_decide(guessed: list[TrialGuess], side: RudderSide | None) -> list[str]:
+def _to_decide(
+    guessed: list[TrialGuess], side: RudderSide | None, *, needs_speed: bool
+) -> list[str]:
     """Every decision as a line of the summary."""
     lines = []
+    if needs_speed:
+        lines.append("speed: the service speed in m/s, as the log has no speed")
     for one in guessed:
         lines += [f"{decision.key}: {decision.choices}" for decision in one.decisions]
     if side is not None and side.side is None:

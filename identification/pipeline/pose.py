@@ -14,6 +14,7 @@ from identification.samples.rudder import estimated_gear
 from identification.samples.samples import build_samples
 from identification.samples.still_water import in_still_water
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
+from shipgym.arrays import Floats
 from shipgym.ships import Envelope, Structure, Term, get_structure
 from shipgym.ships.structures import GREY_BOX, MMG, get_dynamics
 from shipgym.trials.scale import check_scale
@@ -195,7 +196,9 @@ def _ship(particulars: Given, trials: Sequence[Trial], table: Structure) -> Part
 
 def _speed_at_start(trials: Sequence[Trial]) -> float:
     """Median of the speeds at which the trials start, m/s."""
-    starts = [np.hypot(trial["u"][0], trial["v"][0]) for trial in trials]
+    starts = []
+    for trial in trials:
+        starts.append(_service(trial.t, np.hypot(trial["u"], trial["v"])))
     speed = float(np.median(starts))
     if speed <= 0.0:
         raise InputError(
@@ -204,6 +207,23 @@ def _speed_at_start(trials: Sequence[Trial]) -> float:
             " m/s)"
         )
     return speed
+
+
+def _service(t: Floats, values: Floats) -> float:
+    """Value at the start of a trial; of one that starts at rest its largest steady one.
+
+    Steady is what changes by less than a twentieth within a tenth of the trial.
+    """
+    start = float(values[0])
+    rows = max(3, t.size // 10)
+    steady = [start]
+    for begin in range(0, t.size - rows + 1, rows):
+        part = values[begin : begin + rows]
+        if np.ptp(part) < 0.05 * np.abs(part).max():
+            steady.append(float(np.mean(part)))
+    at_rest = 0.2  # of the largest one
+    largest = max(steady)
+    return largest if start < at_rest * largest else start
 
 
 def _shaft_speed(
@@ -216,7 +236,7 @@ def _shaft_speed(
         return 0.0
     if given is not None:
         return float(given)
-    shaft = float(np.median([trial["n"][0] for trial in trials]))
+    shaft = float(np.median([_service(trial.t, trial["n"]) for trial in trials]))
     if shaft <= 0.0:
         raise InputError(
             f"trial {trials[0].name!r}: expected the shaft speed of service speed at"

@@ -10,7 +10,7 @@ from shipgym.files import LARGEST_TOML, read_text
 #: Stands in a ship file for a value that its reader has to choose.
 _DECIDE = "decide"
 
-_SECTIONS = ("columns", "conventions", "sensors", "trials")
+_SECTIONS = ("ship", "columns", "conventions", "sensors", "trials")
 
 
 def take_undecided(data: dict[str, Any], path: Path) -> tuple[str, ...]:

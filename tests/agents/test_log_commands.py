@@ -84,7 +84,7 @@ def test_a_log_that_is_none_is_one_message(log, monkeypatch, capsys):
     code, said = command(monkeypatch, capsys, "look", "bad.csv")
     assert (
         code,
-        "psi: expected the column of the heading, one of 'a', 'b'" in said,
+        "psi: expected the column of the heading, one of 'b', 'c'" in said,
     ) == (2, True)
 
 
@@ -156,7 +156,7 @@ def test_a_log_without_known_names_gives_a_ship_file_to_complete(
         in written
     )
     code, said = command(monkeypatch, capsys, "identify", "ship.toml", "--out", "out")
-    assert (code, "ship.toml: line 14: t: expected a decision" in said) == (2, True), (
+    assert (code, "ship.toml: line 19: t: expected a decision" in said) == (2, True), (
         said
     )
     for channel, name in {"t": "a", "psi": "b", "delta": "c"}.items():

@@ -6,6 +6,7 @@ import io
 import numpy as np
 import pytest
 
+from shipgym.errors import InputError
 from shipgym.trials.guesses import guess_trial
 from tests.shipgym.one_zigzag import sailed
 
@@ -207,3 +208,25 @@ def test_units_that_a_name_or_recorder_defines_are_known(tmp_path):
     guess = guessed(tmp_path, table(names, 1000 * T, yaw, RATE, rudder))
     units = {one.channel: one.unit for one in guess.columns}
     assert units == {"t": "ms", "psi": "rad", "r": "rad/s", "delta_command": "rad"}
+
+
+def test_files_of_one_log_are_read_together(tmp_path):
+    columns = plain()
+    part = table(["t", "Heading"], T, columns["Heading"])
+    (tmp_path / "gyro.csv").write_text(part)
+    part = table(["t", "Rudder"], T[::2], columns["Rudder"][::2])
+    (tmp_path / "gear.csv").write_text(part)
+    guess = guess_trial(tmp_path / "gyro.csv", tmp_path / "gear.csv")
+    assert guess.trial.channels.keys() >= {"psi", "delta"}
+    assert turned(guess.trial) < 0.3
+    assert guess.side.side == "starboard"
+
+
+def test_a_parquet_file_that_unpacks_to_too_much_is_refused(tmp_path, monkeypatch):
+    arrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    texts = arrow.DictionaryArray.from_arrays([0] * 20, ["x" * 100_000])
+    parquet.write_table(arrow.table({"t": texts}), tmp_path / "log.parquet")
+    monkeypatch.setattr("shipgym.trials.readers.text_files.LARGEST_UNPACKED", 2**20)
+    with pytest.raises(InputError, match="at most 1048576 bytes unpacked"):
+        guess_trial(tmp_path / "log.parquet")

@@ -5,6 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from shipgym.arrays import Floats
 from shipgym.checks import quoted, shown
 from shipgym.errors import InputError
 from shipgym.trials.conventions import Conventions, Installation
@@ -257,18 +260,50 @@ def _missing_columns(
         if "delta" not in columns:
             wanted["delta"] = "rudder angle"
     used = {guess.column for guess in columns.values()}
-    every = [name for table in tables for name in table.header]
-    free = [name for name in every if name not in used]
     missing = []
     for channel, words in wanted.items():
         if channel not in columns and channel not in asked:
-            unit = "s" if channel == "t" else "deg"
-            choices = (
-                f"the column of the {words}, one of {quoted(free)[:1000]}, as"
-                f' {{ column = "{free[0] if free else words}", unit = "{unit}" }}'
-            )
+            choices = _choices(tables, used, channel, words)
             missing.append(Decision("columns", channel, choices))
     return missing
+
+
+def _choices(
+    tables: Sequence[LogTable], used: set[str], channel: str, words: str
+) -> str:
+    """Free columns that behave as a channel does, or all free ones where none does."""
+    free = []
+    alike = []
+    for table in tables:
+        for name in table.header:
+            if name in used:
+                continue
+            free.append(name)
+            values = table.likely_numbers(name, sided=True)
+            if values is not None and _behaves(channel, values):
+                alike.append(name)
+    first = next(iter(alike or free), words)
+    unit = "s" if channel == "t" else "deg"
+    column = f'{{ column = "{first}", unit = "{unit}" }}'
+    return (
+        f"the column of the {words}, one of {quoted(alike or free)[:1000]}, as {column}"
+    )
+
+
+def _behaves(channel: str, values: Floats) -> bool:
+    """Return whether values behave as time, a heading or a rudder in degrees or rad."""
+    known = values[np.isfinite(values)]
+    if known.size < 3 or np.ptp(known) == 0.0:
+        return False
+    steps = np.diff(known)
+    if channel == "t":
+        return bool(np.mean(steps > 0.0) > 0.99)
+    largest = np.abs(known).max()
+    counts = bool(np.all(steps > 0.0))  # as a number of rows does
+    if channel == "psi":
+        return not counts and largest <= 720.0
+    swings = known.min() < 0.0 < known.max()
+    return bool(swings and largest <= 90.0)
 
 
 def _decision(error: InputError, decisions: list[Decision]) -> Decision:
