@@ -84,7 +84,7 @@ def test_a_log_that_is_none_is_one_message(log, monkeypatch, capsys):
     code, said = command(monkeypatch, capsys, "look", "bad.csv")
     assert (
         code,
-        "psi: expected the column of the heading, one of 'b', 'c'" in said,
+        "psi: expected the column of the heading, one of 'a', 'b'" in said,
     ) == (2, True)
 
 
@@ -152,7 +152,7 @@ def test_a_log_without_known_names_gives_a_ship_file_to_complete(
     assert (code, "complete the lines marked DECIDE" in said) == (0, True)
     written = (log / "ship.toml").read_text()
     assert (
-        "psi = \"decide\"   # DECIDE: the column of the heading, one of 'a', 'b'"
+        "psi = \"decide\"   # DECIDE: the column of the heading, one of 'b', 'c'"
         in written
     )
     code, said = command(monkeypatch, capsys, "identify", "ship.toml", "--out", "out")
