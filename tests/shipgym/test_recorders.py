@@ -230,3 +230,23 @@ def test_a_parquet_file_that_unpacks_to_too_much_is_refused(tmp_path, monkeypatc
     monkeypatch.setattr("shipgym.trials.readers.text_files.LARGEST_UNPACKED", 2**20)
     with pytest.raises(InputError, match="at most 1048576 bytes unpacked"):
         guess_trial(tmp_path / "log.parquet")
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_side_of_a_rudder_order_is_told_where_no_rudder_was_measured(
+    tmp_path, sign
+):
+    columns = plain()
+    order = [sign * one.rudder for one in SHIP]
+    text = table(["Time", "Heading", "Rudder Order"], T, columns["Heading"], order)
+    guess = guessed(tmp_path, text)
+    assert guess.side.side == ("starboard" if sign > 0.0 else "port")
+
+
+def test_names_of_parts_are_known(tmp_path):
+    names = ["RecTime", "GYRO HDG", "rud_fb", "POS N", "POS E"]
+    columns = plain()
+    positions = [[one.lat for one in SHIP], [one.lon for one in SHIP]]
+    text = table(names, T, columns["Heading"], columns["Rudder"], *positions)
+    found = [one.channel for one in guessed(tmp_path, text).columns]
+    assert sorted(found) == ["delta", "lat", "lon", "psi", "t"]

@@ -310,6 +310,10 @@ def _may_be(table: LogTable, column: str, channel: str) -> bool:
         return False
     if channel in _MOVING and np.ptp(known) == 0.0:
         return False
+    largest_change_deg = 20.0  # of positions in a log
+    if channel in ("lat", "lon") and np.abs(known).max() < 360.0:
+        low, high = np.quantile(known, [0.02, 0.98])
+        return bool(high - low < largest_change_deg)
     goes_back = np.mean(known < -0.5) > 0.05
     return not (channel in ("sog", "stw", "wind_speed") and goes_back)
 
@@ -391,6 +395,7 @@ def _even_column(table: LogTable, free: list[str]) -> ColumnGuess | None:
         values = table.likely_numbers(column, sided=True)
         if values is None or values.size < 10:
             continue
+        values = values[np.isfinite(values)]
         steps = np.diff(values)
         is_even = np.all(steps > 0.0) and np.ptp(steps) <= 0.01 * steps.max()
         is_count = values[0] in (0.0, 1.0) and np.all(steps == 1.0)

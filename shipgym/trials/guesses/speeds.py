@@ -35,6 +35,7 @@ def settle_speeds(
     settled = dict(guesses)
     speeds = [channel for channel in _SPEEDS if channel in settled]
     if not speeds:
+        settled.pop("cog", None)
         return settled
     by_positions = _speed_by_positions(table, settled)
     is_si = any(guess.unit in ("rad", "rad/s") for guess in guesses.values())

@@ -145,7 +145,8 @@ def guess_trial(path: str | Path, *others: str | Path) -> TrialGuess:
         conventions = {}
     else:
         is_turned = "rudder_positive" in conventions
-        side = _rudder_side(tables, trial, columns.get("delta"), is_turned=is_turned)
+        rudder = columns.get("delta") or columns.get("delta_command")
+        side = _rudder_side(tables, trial, rudder, is_turned=is_turned)
         if side is not None and side.side == "port" and not is_turned:
             turned = ConventionGuess("rudder_positive", "port", side.reason)
             conventions["rudder_positive"] = turned
@@ -194,7 +195,8 @@ def _rudder_side(
 
     None without a rudder or heading.
     """
-    if not {"psi", "delta"} <= trial.channels.keys():
+    rudder = trial.channels.get("delta", trial.channels.get("delta_command"))
+    if "psi" not in trial or rudder is None:
         return None
     for table in tables:
         if column is None or column.column not in table.cells:
@@ -204,7 +206,7 @@ def _rudder_side(
             first = first.replace(",", ".")
         if number_with_side(first) is not None:
             return RudderSide("starboard", "the letters S and P of its values")
-    found = rudder_sign(trial.t, trial["psi"], trial["delta"])
+    found = rudder_sign(trial.t, trial["psi"], rudder)
     if found.side is None:
         hint = found.side_by_hint(is_turned=is_turned)
         return RudderSide(None, f"the log does not tell{hint}")
