@@ -9,15 +9,18 @@ it is.
 
 import os
 import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from shipgym.engine.cache import cached_path, load, locked, save
 from shipgym.engine.fingerprint import fingerprint, process_name, traced
-from shipgym.engine.numba_errors import explanation
+from shipgym.engine.numba_errors import explanation, refuse_unset
 from shipgym.engine.numba_import import load_numba
-from shipgym.engine.specialise import Hooks, Specialisation
+from shipgym.engine.specialise import ALL, BOUNDS, Hooks, Specialisation
 from shipgym.errors import InputError
 
 # error_model "numpy" keeps loops free of branches; contraction is the only fast-math
@@ -95,21 +98,24 @@ def plain_python() -> bool:
 class Compilation(Specialisation):
     """Compiled copies of functions that loops call; loops share them."""
 
-    def inner(self, function: Any, inlined: bool, checked: bool) -> Any:
+    def inner(self, function: Any, inlined: bool, checks: int) -> Any:
         """Compile a function that others call."""
         numba = load_numba()
         tag, records = traced(function, self.hooks)
         code = function.__code__
         place = (code.co_filename, code.co_firstlineno)  # which errors name
         process = os.getpid()  # a forked one compiles under names of its own
-        key = (process, tag, records, inlined, checked, place)
+        key = (process, tag, records, inlined, checks, place)
         # functions that loops call need no entries for Python and C, which take longer
         # to compile than many a function
         inner = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
         if key not in SHARED:
-            options = {"forceinline": inlined, "boundscheck": checked}
-            jit = numba.njit(**options, **inner, **SEMANTICS)
-            SHARED[key] = jit(_named(self.copy(function, checked)))
+            options = {**SEMANTICS, "forceinline": inlined}
+            options["boundscheck"] = checks >= BOUNDS
+            if checks == ALL:
+                options["error_model"] = "python"
+            jit = numba.njit(**options, **inner)
+            SHARED[key] = jit(_named(self.copy(function, checks)))
         return SHARED[key]
 
 
@@ -122,7 +128,8 @@ def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
     tell_who_waits(f"shipgym: compiling {what}, once, about 7 s")
     specialised = _named(Compilation(hooks).copy(loop))
     try:
-        return numba.njit(signature, nogil=True, **SEMANTICS)(specialised)
+        with _unset_refused(hooks.get("CHECKED", True)):
+            return numba.njit(signature, nogil=True, **SEMANTICS)(specialised)
     # the latter three: another record than is due, none at all, one whose field is set
     except (
         NumbaError,
@@ -132,6 +139,24 @@ def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
         NotImplementedError,
     ) as error:
         raise InputError(explanation(error, what)) from None
+
+
+@contextmanager
+def _unset_refused(checked: bool) -> Iterator[None]:
+    """Refuse, of what is compiled within, variables of users that may be unset."""
+    numba = load_numba()
+    from numba.core.errors import NumbaWarning
+
+    before = numba.config.ALWAYS_WARN_UNINIT_VAR
+    numba.config.ALWAYS_WARN_UNINIT_VAR = int(checked)
+    try:
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always", NumbaWarning)
+            yield
+    finally:
+        numba.config.ALWAYS_WARN_UNINIT_VAR = before
+    for one in found:
+        refuse_unset(one.message)
 
 
 def _named(copy: Any) -> Any:

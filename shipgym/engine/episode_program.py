@@ -23,6 +23,7 @@ from shipgym.engine.memory import Arguments
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.record_code import clipped_storer, loader, storer, summed, zeros
 from shipgym.engine.records import LANES, Layout
+from shipgym.engine.specialise import is_plain, takes_entries, users_functions
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +38,8 @@ class EpisodeProgram:
     sensors : shipgym.instruments.sensor_set.SensorSet
     shared : bool
         Whether all lanes have the same ship and sea.
+    checked : bool
+        Whether users' functions are compiled with checks of indices and divisors.
     """
 
     ship: CompiledShip
@@ -44,6 +47,7 @@ class EpisodeProgram:
     task: Any
     sensors: Any
     shared: bool
+    checked: bool = True
 
     @cached_property
     def state_rows(self) -> Layout:
@@ -121,6 +125,8 @@ class EpisodeProgram:
         return {
             "GROUP": 1 if plain_python() else tiles.GROUP,
             "SHARED_SHIP": self.shared,
+            "CHECKED": self.checked,
+            "MAY_FAIL": self.checked and self._may_fail,
             "PLAN_ROW": self.state_rows.n_rows,
             **_loaders(self.state_rows, LANES),
             **_storers(self.state_rows, LANES),
@@ -144,6 +150,23 @@ class EpisodeProgram:
             "CURRENT_BY_PLACE": self.task.current is not None,
             "current_at": self.task.current or hooks.current_at,
         }
+
+    @cached_property
+    def users_code(self) -> frozenset[Any]:
+        """Functions of users that the loop is made of."""
+        found: set[Any] = set()
+        for function in self.hooks.values():
+            if is_plain(function):
+                found |= users_functions(function, {})
+        return frozenset(found)
+
+    @cached_property
+    def _may_fail(self) -> bool:
+        """Whether a function that each interval calls takes entries of arrays."""
+        task = self.task
+        asked = (task.step, task.observe, task.due, task.worst_cost)
+        sensors = (self.sensors.measure, self.sensors.readings)
+        return any(takes_entries(one, {}) for one in (*asked, *sensors))
 
     def _task_hooks(self) -> dict[str, Any]:
         """Functions of the task, and what its records are used for."""

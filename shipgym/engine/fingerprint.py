@@ -40,7 +40,7 @@ def fingerprint(function: Any, hooks: Hooks) -> str:
 def traced(function: Any, hooks: Hooks) -> tuple[str, tuple[Any, ...]]:
     """Hash a function with its hooks filled; also return the records that it names."""
     trace = _Trace(hooks)
-    trace.add(_compiler())
+    trace.add((_compiler(), hooks.get("CHECKED", True)))
     trace.visit(function)
     digest = trace.digest.hexdigest()
     return digest[:24], tuple(trace.records)

@@ -55,6 +55,10 @@ from shipgym.engine.tiles import (
     plan_of,
 )
 
+# Set when a loop is compiled, like hooks: whether users' functions may fail. They are
+# then not asked about ships that are over, which may be beyond what they expect.
+MAY_FAIL = False
+
 
 class LaneView(NamedTuple):
     """A ship, the data of her model, and the scales of her observations."""
@@ -103,14 +107,17 @@ def conclude_lanes(tile: Tile, groups: int) -> tuple[int, int]:
     n_due = 0
     n_ended = 0
     for lane in range(groups * GROUP):
+        if MAY_FAIL and lane >= tile.lanes:
+            break
         ship, data, scale = shared if SHARED_SHIP else view_of(tile, lane)
         motion = load_motion(state, lane)
         over = load_counters(state, lane).ended != 0.0
         interval = past_interval(tile, lane, motion, data, settings.rules)
 
         task_state, just_ended = judge(tile, lane, motion, interval, ship, settings)
-        memory = sample(tile, lane, motion, interval, settings)
-        memory = pick(over, load_memory(state, lane), memory)
+        memory = load_memory(state, lane)
+        if not (MAY_FAIL and over):
+            memory = pick(over, memory, sample(tile, lane, motion, interval, settings))
         store_memory(state, lane, memory)
         seen = readings(motion, load_sea(state, lane), memory)
         observation = observe(
@@ -164,11 +171,13 @@ def judge(
     counters = load_counters(tile.state, lane)
     over = counters.ended != 0.0
     before = load_task_state(tile.state, lane)
-    after, reward, failed, arrived = task_step(
-        motion, before, interval, ship, settings.task, tile, lane
-    )
-    task_state = pick(over, before, after)
-    reward = pick(over, no_reward(), reward)
+    task_state, reward, failed, arrived = before, no_reward(), False, False
+    if not (MAY_FAIL and over):
+        after, earned, failed, arrived = task_step(
+            motion, before, interval, ship, settings.task, tile, lane
+        )
+        task_state = pick(over, before, after)
+        reward = pick(over, reward, earned)
     earned = total_reward(reward)
     outcome = outcome_of(interval, counters, failed, arrived, earned, settings)
 

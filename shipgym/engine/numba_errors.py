@@ -2,7 +2,9 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
+from shipgym.errors import InputError
 from shipgym.python_files import LIBRARIES
 
 #: Plain words for reasons of Numba that are hard to understand.
@@ -34,6 +36,21 @@ def explanation(error: Exception, what: str) -> str:
     written = re.search(r"^def (\w+)\(", text, re.MULTILINE)
     where = f" in {written[1]}" if written else ""
     return f"{what}: cannot be compiled{where}{_place(text)}: {reason}"
+
+
+def refuse_unset(warning: Any) -> None:
+    """Raise an InputError if Numba warns of a user's variable that may be unset.
+
+    Python fails where such a variable is used; compiled code takes a 0 for it.
+    """
+    name = re.search(r"uninitialized variable (\w+)", str(warning))
+    file = str(Path(warning.loc.filename).resolve()) if name else ""
+    if name and not file.startswith(("<", *LIBRARIES)):
+        raise InputError(
+            f"{file}, line {warning.loc.line}: expected variables that are set in every"
+            f" case, got {name[1]!r}, which is not; give it a value before the if or"
+            " the loop that sets it"
+        )
 
 
 def _reason(text: str) -> str:

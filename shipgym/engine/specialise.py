@@ -18,6 +18,8 @@ from typing import Any, TypeVar
 from shipgym.errors import InputError
 from shipgym.python_files import nested_code, place_of, refuse_closure
 
+#: What compiled code looks at: nothing, the bounds of arrays, or divisors too.
+NOTHING, BOUNDS, ALL = range(3)
 #: Functions that fill hooks, and values of constants, by name.
 Hooks = Mapping[str, Any]
 AnyFunction = TypeVar("AnyFunction", bound=Callable[..., Any])
@@ -40,6 +42,37 @@ def is_inlined(function: Any) -> bool:
 def is_shipped(function: Any) -> bool:
     """Return whether a function is one of the package's, and not a user's."""
     return bool(function.__module__.partition(".")[0] == "shipgym")
+
+
+def takes_entries(function: Any, hooks: Hooks) -> bool:
+    """Return whether users' code in a function, or in what it names, may fail.
+
+    It does where it takes an entry of an array by a number that is computed.
+    """
+    return any(_takes_entries(one.__code__) for one in users_functions(function, hooks))
+
+
+def users_functions(function: Any, hooks: Hooks) -> set[Any]:
+    """Users' functions among a function and those that it names."""
+    found = {function}
+    new = [function]
+    while new:
+        for _, value in named_globals(new.pop(), hooks):
+            if is_plain(value) and value not in found:
+                found.add(value)
+                new.append(value)
+    return {one for one in found if not is_shipped(one)}
+
+
+def _takes_entries(code: CodeType) -> bool:
+    for one in nested_code(code):
+        before = ""
+        for instruction in dis.get_instructions(one):
+            takes = instruction.opname == "BINARY_SUBSCR" or instruction.argrepr == "[]"
+            if takes and before not in ("LOAD_CONST", "BUILD_SLICE"):
+                return True
+            before = instruction.opname
+    return False
 
 
 def is_plain(value: Any) -> bool:
@@ -88,17 +121,17 @@ class Specialisation:
     Parameters
     ----------
     hooks : mapping
-        What fills hooks and constants, by name.
+        What fills hooks and constants, by name; `CHECKED` False leaves checks out.
     """
 
     def __init__(self, hooks: Hooks) -> None:
         self.hooks = hooks
         self._made: dict[Any, Any] = {}
 
-    def copy(self, function: Any, checked: bool = False) -> FunctionType:
+    def copy(self, function: Any, checks: int = NOTHING) -> FunctionType:
         """Copy a function with its hooks filled, and the functions that it names.
 
-        `checked`: whether it, and what it calls, look at the bounds of arrays.
+        `checks`: what it, and what it calls, look at.
         """
         if function.__code__.co_kwonlyargcount:
             raise InputError(
@@ -114,7 +147,7 @@ class Specialisation:
             if is_plain(value):
                 hook = function.__globals__.get(name, value)
                 inlined = is_inlined(value) and is_inlined(hook)
-                value = self._inner(value, inlined, checked)
+                value = self._inner(value, inlined, checks)
             namespace[name] = value
         for name in loaded_names(function.__code__):
             if name not in namespace and not hasattr(builtins, name):
@@ -125,19 +158,19 @@ class Specialisation:
             function.__code__, namespace, function.__name__, function.__defaults__
         )
 
-    def inner(self, function: Any, inlined: bool, checked: bool) -> Any:
+    def inner(self, function: Any, inlined: bool, checks: int) -> Any:
         """Make the replacement of a function in those that name it."""
-        return self.copy(function, checked)
+        return self.copy(function, checks)
 
-    def _inner(self, function: Any, inlined: bool, checked: bool) -> Any:
+    def _inner(self, function: Any, inlined: bool, checks: int) -> Any:
         """`inner`, once for each function; InputError for one that calls itself."""
-        # a user's function that is called may write into its plan, next to which is
-        # the state of other ships
-        checked = checked or not (inlined or is_shipped(function))
-        key = (function, inlined, checked)
+        if self.hooks.get("CHECKED", True) and not is_shipped(function):
+            # a look at each divisor keeps a loop from being vectorised
+            checks = max(checks, BOUNDS if inlined else ALL)
+        key = (function, inlined, checks)
         if key not in self._made:
             self._made[key] = None
-            self._made[key] = self.inner(function, inlined, checked)
+            self._made[key] = self.inner(function, inlined, checks)
         if self._made[key] is None:
             raise InputError(
                 f"{place_of(function)}: expected a function that can be compiled, got"

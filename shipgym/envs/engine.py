@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import partial
 from typing import Any, NoReturn
 
@@ -18,11 +18,11 @@ from shipgym.engine.episodes import BEGIN, BEGIN_NEXT, STEP, STEP_AND_BEGIN
 from shipgym.engine.records import LANES
 from shipgym.envs.lanes import Contents, Lanes
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES
-from shipgym.envs.plain_python import plain_loop
+from shipgym.envs.plain_python import fault_of_interval, plain_loop
 from shipgym.envs.randomisation import Pool, Randomisation
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
-from shipgym.python_files import asked
+from shipgym.python_files import asked, place_of
 from shipgym.sea.open_sea import CALM_SEA, OPEN_SEA
 from shipgym.tasks.task import Task, course_keeping_task
 
@@ -103,6 +103,7 @@ class Engine(Lanes):
             task.definition,
             task.instruments(windy),
             len(own) == 1,
+            task.checked,
         )
         contents = Contents(own, drawn, scale_task)
         super().__init__(program, model, task, num_envs, contents, threads)
@@ -120,7 +121,32 @@ class Engine(Lanes):
         self.renew_outputs()
         # last, when no input is left that may be refused
         self._run = loop(self.program)
+        if self.program.users_code and loop == self._compiled:
+            self._run = partial(self._explained, self._run)
         self.reset(np.arange(self.num_envs))
+
+    def _explained(self, run: Callable[..., int], *arguments: Any) -> int:
+        """Run a compiled loop; InputError names what fails in it, and where."""
+        try:
+            return run(*arguments)
+        except (IndexError, ArithmeticError, ValueError) as error:
+            *_, asked = arguments
+            begins = asked in (BEGIN, BEGIN_NEXT)
+            fault = fault_in_python(self.model, self.task) if begins else self._fault()
+            if not fault:
+                functions = [place_of(one) for one in self.program.users_code]
+                places = "; ".join(sorted(functions))
+                fault = f"{type(error).__name__}: {error}, in one of these: {places}"
+            raise InputError(fault) from None
+
+    def _fault(self) -> str:
+        """Say what fails in the last interval: in plain Python, which knows the line.
+
+        It is empty where nothing does.
+        """
+        program = self.program
+        fault, lane = fault_of_interval(program, self._memory, len(self._states))
+        return fault and f"{fault}, in lane {lane} at step {self.steps[lane]:g}"
 
     def _compiled(self, program: EpisodeProgram) -> Any:
         """Return the loop of a program; InputError names what does not compile."""
@@ -185,10 +211,11 @@ class Engine(Lanes):
         for share in range(1, self.n_shares):
             others.append(self._threads.submit(run, share, asked))
         # the first share is this thread's, which would wait for the others otherwise
-        n_ended: int = run(0, asked)
-        for other in others:
-            n_ended += other.result()
-        return n_ended
+        try:
+            n_ended: int = run(0, asked)
+        finally:
+            wait(others)  # none goes on while an error is told
+        return n_ended + sum(other.result() for other in others)
 
     def step_of_one(self) -> Callable[[], int]:
         """Return the step of an engine of one lane, whose arrays stay the same.
@@ -249,12 +276,7 @@ class Engine(Lanes):
 
     def _begin(self, chosen: Flags, asked: int) -> None:
         self._chosen[:] = chosen
-        try:
-            self._run(self._memory, self.outputs.memory, 0, asked)
-        except IndexError as error:  # raised by a user's function
-            fault = fault_in_python(self.model, self.task)
-            source = self.task.definition.source
-            raise InputError(fault or f"{source}: begin: {error}") from None
+        self._run(self._memory, self.outputs.memory, 0, asked)
 
     def order(self, actions: ArrayLike) -> None:
         """Set the commands for the next step, which refuses non-finite ones.
@@ -299,8 +321,8 @@ class Engine(Lanes):
         step = self.steps[lane]
         raise InputError(
             f"{self.task.definition.reward_source}: {name}: expected a finite number,"
-            f" got {reward} in lane {lane} at step {step:g}; look for a division by"
-            " zero or a root of a negative number (shipgym.check_task helps)"
+            f" got {reward} in lane {lane} at step {step:g}; "
+            + (self._fault() or "look for a division by zero")
         )
 
     @property

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from numbers import Integral, Real
+from traceback import walk_tb
 from typing import Any, get_args
 
 import numpy as np
@@ -12,7 +13,7 @@ from shipgym.engine.compiling import plain
 from shipgym.engine.episode_program import EpisodeProgram
 from shipgym.engine.extra_arguments import innermost
 from shipgym.engine.motion import Motion
-from shipgym.engine.records import Record, is_array, is_record, members
+from shipgym.engine.records import LANES, Record, is_array, is_record, members
 from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError
 from shipgym.python_files import asked, place_of
@@ -22,8 +23,9 @@ from shipgym.tasks.contract import Readings
 def plain_loop(
     program: EpisodeProgram,
     hooks: Mapping[str, Callable[..., Any]] | None = None,
+    function: Callable[..., Any] = episodes.run,
 ) -> Any:
-    """Return the loop of a program in plain Python, with `hooks` in place of its own.
+    """Return a loop of a program in plain Python, with `hooks` in place of its own.
 
     An error in a function of the task or the sensor set, or a result in another form
     than the contract's, is an InputError that names file, line and function.
@@ -42,9 +44,37 @@ def plain_loop(
     if task.current is not None:
         forms["current_at"] = (float, float)
     checked = {name: _checked(program, name, form) for name, form in forms.items()}
-    run = plain(episodes.run, {**program.hooks, **checked, **(hooks or {})})
+    run = plain(function, {**program.hooks, **checked, **(hooks or {})})
     # words of random numbers overflow, as they do when compiled
     return np.errstate(all="ignore")(run)
+
+
+def fault_of_interval(
+    program: EpisodeProgram, memory: Any, tiles: int
+) -> tuple[str, int]:
+    """Judge the last interval again in plain Python; return the first fault and lane.
+
+    The fault is empty if there is none.
+
+    Parameters
+    ----------
+    program : EpisodeProgram
+    memory : float64 array
+        Of the engine; it stays as it is.
+    tiles : int
+        Number of tiles of lanes.
+    """
+    judge = plain_loop(program, function=episodes.judge_again)
+    for number in range(tiles):
+        try:
+            judge(memory.copy(), number)
+        except InputError as error:
+            frames = [frame for frame, _ in walk_tb(error.__traceback__)]
+            lane = next(
+                one.f_locals["lane"] for one in frames if "lane" in one.f_locals
+            )
+            return str(error), LANES * number + lane
+    return "", 0
 
 
 def _checked(program: EpisodeProgram, name: str, form: Any) -> Callable[..., Any]:
@@ -59,7 +89,9 @@ def _checked(program: EpisodeProgram, name: str, form: Any) -> Callable[..., Any
 
 def _result_of(function: Any, reward: Any, form: Any, *arguments: Any) -> Any:
     """Call a function, and refuse a result in another form."""
-    given = asked(function, *arguments)
+    # NumPy's numbers fail as Python's own do
+    with np.errstate(divide="raise", invalid="raise"):
+        given = asked(function, *arguments)
     fault = _fault(given, form, "returned value")
     if fault and reward is not None:
         fault = fault.replace("result 2", "returned value")  # the reward

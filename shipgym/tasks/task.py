@@ -107,6 +107,9 @@ class Task:
         cost charges a lost one the worst. By default `LOSS_HORIZON`, the horizon
         1 / (1 - 0.99) of a learner's discount, or, of minus the cost, the rest of the
         episode.
+    checked : bool
+        Whether functions of your own are compiled with checks of indices and, where an
+        episode begins or an event is due, of divisors.
     sensors : SensorSet, optional
         Instruments of a user's own in place of `noise` and `measurement`; as a keyword,
         their file.
@@ -129,6 +132,7 @@ class Task:
     water_depth: float = float("inf")
     bounded: bool | float = True
     loss_horizon: float | None = None
+    checked: bool = True
     sensors: SensorSet | None = None
     sensor_settings: Any = None
     options: Mapping[str, Any] = field(default_factory=dict, compare=False)

@@ -13,7 +13,12 @@ from shipgym.checks import check_whole
 from shipgym.engine.mathematics import arctan2, clip, pick, sin_cos, wrap
 from shipgym.engine.motion import CALM, Motion, Ship, lost, sail
 from shipgym.engine.records import is_record
-from shipgym.engine.specialise import Specialisation, captured_globals, is_plain
+from shipgym.engine.specialise import (
+    NOTHING,
+    Specialisation,
+    captured_globals,
+    is_plain,
+)
 from shipgym.errors import InputError
 from shipgym.python_files import place_of
 from shipgym.tasks.contract import at_service_speed
@@ -196,8 +201,8 @@ _TARGET_SHIP: Any = None
 class _OfTarget(Specialisation):
     """Copies that keep the equations of a target where those of a ship are filled."""
 
-    def copy(self, function: Any, checked: bool = False) -> Any:
-        made = super().copy(function, checked)
+    def copy(self, function: Any, checks: int = NOTHING) -> Any:
+        made = super().copy(function, checks)
         made.__module__ = "target_ship"  # hooks of the package fill its functions only
         return made
 

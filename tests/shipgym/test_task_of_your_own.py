@@ -376,19 +376,14 @@ def test_what_a_function_takes_from_its_file_is_fit_for_the_compiler(
     assert_refused(*wrong_fairway(tmp_path, text, "    inside =", added, message))
 
 
-def test_an_observation_that_is_no_number_before_the_first_step_is_a_problem(tmp_path):
+def test_a_division_by_zero_before_the_first_step_is_named_with_its_line(tmp_path):
     text = FAIRWAY.replace(
         "to_zone = max(", "to_zone = readings.x / interval.steps + max("
     )
-    found = check_task(written(tmp_path, "fairway.py", text), **SHIP)
-    assert any(
-        "Observation.to_zone: expected a finite number, got nan in lane 0 at step 0"
-        in problem
-        for problem in found.problems
-    )
-    assert not any(
-        "nan found" in remark for remark in found.remarks
-    )  # of what is clipped
+    path = written(tmp_path, "fairway.py", text)
+    line = 1 + text[: text.index("to_zone = readings")].count("\n")
+    (problem,) = check_task(path, **SHIP).problems
+    assert f"{path}, line {line}, in observe: FloatingPointError: invalid" in problem
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):
