@@ -215,7 +215,9 @@ class Engine(Lanes):
             n_ended: int = run(0, asked)
         finally:
             wait(others)  # none goes on while an error is told
-        return n_ended + sum(other.result() for other in others)
+        for other in others:
+            n_ended += other.result()
+        return n_ended
 
     def step_of_one(self) -> Callable[[], int]:
         """Return the step of an engine of one lane, whose arrays stay the same.
