@@ -1,4 +1,4 @@
-"""Draw docs/images/examples.png: the example tasks, one picture each.
+"""Draw docs/images/examples.png, the example tasks, and encounter.png.
 
     python scripts/draw_examples.py
 
@@ -17,40 +17,39 @@ SIZE = 600  # pixels of a picture
 
 
 class Shown(NamedTuple):
-    """An example, and how it comes to its picture."""
+    """An environment, and how it comes to its picture."""
 
-    name: str
+    env_id: str
     settings: dict[str, Any]
     shaft: float
     steps: int
 
 
-SHOWN = (
-    Shown("Encounter", {"case": 17}, 1.0, 16),
-    Shown("Berth", {}, 0.35, 40),
-    Shown("River", {}, 0.7, 25),
-    Shown("Fairway", {"dt": 5.0}, 0.7, 80),
+EXAMPLES = (
+    Shown("shipgym.examples:examples/Berth-v0", {}, 0.35, 40),
+    Shown("shipgym.examples:examples/River-v0", {}, 0.7, 25),
+    Shown("shipgym.examples:examples/Fairway-v0", {"dt": 5.0}, 0.7, 80),
+)
+ENCOUNTERS = (
+    Shown("shipgym:shipgym/Encounter-v0", {"case": 17}, 1.0, 40),
+    Shown("shipgym:shipgym/Encounter-v0", {"case": 14}, 1.0, 50),
 )
 
 
 def main() -> None:
-    """Write the four pictures as one."""
-    montage = Image.new("RGB", (2 * SIZE, 2 * SIZE))
-    for number, shown in enumerate(SHOWN):
-        row, column = divmod(number, 2)
-        montage.paste(picture(shown), (column * SIZE, row * SIZE))
-    path = ROOT / "docs" / "images" / "examples.png"
-    montage.quantize(128).save(path, optimize=True)
-    print(path, path.stat().st_size, "bytes")
+    """Write both, each several pictures side by side."""
+    for name, row in (("encounter", ENCOUNTERS), ("examples", EXAMPLES)):
+        montage = Image.new("RGB", (len(row) * SIZE, SIZE))
+        for column, shown in enumerate(row):
+            montage.paste(picture(shown), (column * SIZE, 0))
+        path = ROOT / "docs" / "images" / f"{name}.png"
+        montage.quantize(128).save(path, optimize=True)
+        print(path, path.stat().st_size, "bytes")
 
 
 def picture(shown: Shown) -> Image.Image:
-    """Sail an example for some steps, and draw it."""
-    env = gymnasium.make(
-        f"shipgym.examples:examples/{shown.name}-v0",
-        render_mode="rgb_array",
-        **shown.settings,
-    )
+    """Sail for some steps, and draw."""
+    env = gymnasium.make(shown.env_id, render_mode="rgb_array", **shown.settings)
     env.reset(seed=0)
     for _ in range(shown.steps):
         _, _, terminated, truncated, _ = env.step(orders(env, shown.shaft))

@@ -1,8 +1,8 @@
-"""A rule of a few numbers against an agent in the examples berth and encounter.
+"""A rule of a few numbers against an agent in the example berth.
 
     python scripts/example_rules.py                   # table of docs/environments
-    python scripts/example_rules.py berth --steps 0   # without an agent
-    python scripts/example_rules.py berth --tune 60   # search the rule's numbers
+    python scripts/example_rules.py --steps 0   # without an agent
+    python scripts/example_rules.py --tune 60   # search the rule's numbers
 
 Judged on 100 episodes that none of them has seen. A search (CMA-ES) has episodes of
 its own and so many seconds of processor; it begins with the numbers of the rule's file
@@ -48,7 +48,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument("names", nargs="*", default=["berth", "encounter"])
+    parser.add_argument("names", nargs="*", default=["berth"])
     parser.add_argument("--tune", type=float, default=0.0, metavar="SECONDS")
     parser.add_argument("--steps", type=int, default=229_376, help="of the agent")
     given = parser.parse_args()
@@ -103,8 +103,7 @@ def rewards(sailed: Rollout, ends: Any) -> Floats:
 def learned(task: BenchmarkTask, steps: int) -> Any:
     """An agent of stable-baselines3."""
     ships = shipgym.ShipVecEnv(id_of(task.name), num_envs=32, seed=0)
-    batch = 256 if task.name == "encounter" else 64
-    agent = PPO("MlpPolicy", ships, n_steps=256, batch_size=batch, seed=0)
+    agent = PPO("MlpPolicy", ships, n_steps=256, seed=0)
     return agent.learn(steps)
 
 

@@ -33,8 +33,8 @@ Environment = Annotated[
     str | None,
     Option(
         help=(
-            "course-keeping (default), path-following, an environment id, module:id, or"
-            " the file of your own task."
+            "course-keeping (default), path-following, encounter, an environment id,"
+            " module:id, or the file of your own task."
         )
     ),
 ]

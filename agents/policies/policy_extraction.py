@@ -189,6 +189,8 @@ def _options(keywords: Mapping[str, Any]) -> dict[str, Any]:
 
 def task_showing(names: Sequence[str]) -> str:
     """Task of the package that shows these quantities."""
+    if "others_0_dcpa" in names:
+        return "Encounter"
     return "PathFollowing" if "cross_track" in names else "CourseKeeping"
 
 

@@ -50,7 +50,7 @@ class BenchmarkTask:
     name : str
         Unique in its suite.
     environment : str
-        "course-keeping", "path-following", or the path of a task's file.
+        "course-keeping", "path-following", "encounter", or the path of a task's file.
     model : str
         Shipped model or model file that controllers are made for.
     why : str

@@ -10,7 +10,11 @@ from shipgym.envs.registration import registered
 from shipgym.python_files import working_folder
 
 #: Tasks of the shipped environments by their short names.
-SHORT_NAMES = {"course-keeping": "CourseKeeping", "path-following": "PathFollowing"}
+SHORT_NAMES = {
+    "course-keeping": "CourseKeeping",
+    "path-following": "PathFollowing",
+    "encounter": "Encounter",
+}
 
 
 class Environment(NamedTuple):
@@ -19,7 +23,7 @@ class Environment(NamedTuple):
     Attributes
     ----------
     name : str
-        "course-keeping", "path-following", or the absolute path of a task's file.
+        A short name, or the absolute path of a task's file.
     options : dict
         Keywords that its id sets, `model` perhaps among them.
     """
@@ -39,8 +43,8 @@ def read_environment(
     Parameters
     ----------
     text : str
-        "course-keeping", "path-following"; the path of a Python file; or an id that is
-        registered with Gymnasium. Of ``module:id`` the module is imported first.
+        A short name; the path of a Python file; or an id that is registered with
+        Gymnasium. Of ``module:id`` the module is imported first.
     folder : Path
         Where relative paths begin.
     where : str

@@ -330,7 +330,7 @@ def load_settings(
     ----------
     algorithm : {"ppo", "sac", "td3", "tqc"}
     environment : str
-        "course-keeping", "path-following", or the path of a task's file.
+        "course-keeping", "path-following", "encounter", or the path of a task's file.
     task : str
         Name of a suite's task; one without settings of its own has those of its
         environment.

@@ -71,6 +71,11 @@ ENVIRONMENTS: dict[str, dict[str, Any]] = {
         "roll_weight": 1.0,
         "model": "container-4dof-output-error",
     },
+    "shipgym/Encounter-v0": {
+        "task": "Encounter",
+        "model": "container-two-zigzags",
+        "bounded": False,
+    },
 }
 
 

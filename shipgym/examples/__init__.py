@@ -10,7 +10,7 @@ from shipgym.checks import check_choice
 from shipgym.envs.registration import register_file
 
 FOLDER = Path(__file__).parent
-TASKS = ("berth", "encounter", "fairway", "river")
+TASKS = ("berth", "fairway", "river")
 
 
 def example_ship(name: str = "mariner") -> Path:

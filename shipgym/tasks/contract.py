@@ -24,7 +24,8 @@ and may define
   set-point.
 * `worst_cost(settings) -> float`: the largest cost of a step. A lost ship costs
   as much for the rest of the episode, so that ending early never lowers the cost.
-* `NAME`, by default that of the file, and `EPISODE_STEPS`, by default 600.
+* `NAME`, by default that of the file; `EPISODE_STEPS`, by default 600; and
+  `STEPS_PER_LENGTH`, control intervals in the time to travel a length, by default 20.
 * `REPORTED`: names of fields of `State` that `info` has; those annotated `Flag` as
   booleans.
 * `plan_length(settings) -> int`: how many numbers `plan` holds, an array that lasts

@@ -42,6 +42,7 @@ from shipgym.engine.specialise import is_shipped
 from shipgym.errors import InputError
 from shipgym.python_files import asked, check_function
 from shipgym.tasks.contract import ObservationSpec
+from shipgym.tasks.scales import STEPS_PER_LENGTH
 from shipgym.tasks.traffic import targets_of
 
 RECORDS = ("Settings", "State", "Reward", "Observation")
@@ -73,6 +74,7 @@ TAKEN = (
 TASKS = {
     "CourseKeeping": "shipgym.tasks.course_keeping",
     "PathFollowing": "shipgym.tasks.path_following",
+    "Encounter": "shipgym.tasks.encounter",
 }
 
 
@@ -130,6 +132,8 @@ class TaskDefinition(Configurable):
         Fields of the state that `info` has.
     episode_steps : int
         Control intervals after which an episode is truncated, by default.
+    steps_per_length : float
+        Control intervals in the time to travel one ship length, about, by default.
     """
 
     State: Record
@@ -146,6 +150,7 @@ class TaskDefinition(Configurable):
     listed: Callable[[Any], Any] = np.asarray
     reported: tuple[str, ...] = ()
     episode_steps: int = 600
+    steps_per_length: float = STEPS_PER_LENGTH
     current: Callable[..., Any] | None = None
     draw: Callable[..., Any] | None = None
 
@@ -277,6 +282,7 @@ def _definition_of(namespace: Any, where: str) -> TaskDefinition:
         source=where,
         reported=tuple(getattr(namespace, "REPORTED", ())),
         episode_steps=getattr(namespace, "EPISODE_STEPS", TaskDefinition.episode_steps),
+        steps_per_length=getattr(namespace, "STEPS_PER_LENGTH", STEPS_PER_LENGTH),
         **found,
     )
 
@@ -297,6 +303,9 @@ def _check_task(namespace: Any, where: str) -> None:
     if hasattr(namespace, "EPISODE_STEPS"):
         steps = namespace.EPISODE_STEPS
         check_whole(steps, f"{where}: EPISODE_STEPS", at_least=1)
+    if hasattr(namespace, "STEPS_PER_LENGTH"):
+        steps = namespace.STEPS_PER_LENGTH
+        check_number(steps, f"{where}: STEPS_PER_LENGTH", at_least=0.2)
 
 
 def _check_reported(namespace: Any, where: str) -> None:

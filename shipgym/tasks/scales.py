@@ -70,9 +70,12 @@ def control_interval(model: ShipModel) -> float:
     return rounded_interval(model.travel_time)
 
 
-def rounded_interval(length_time: float) -> float:
-    """Control interval of a ship that travels her length in a time, s."""
-    wanted = length_time / STEPS_PER_LENGTH
+def rounded_interval(length_time: float, steps: float = STEPS_PER_LENGTH) -> float:
+    """Control interval of a ship that travels her length in a time, s.
+
+    About so many `steps` fill that time.
+    """
+    wanted = length_time / steps
     decade = np.floor(np.log10(wanted))
     intervals = 10.0**decade * np.array([1.0, 2.0, 5.0, 10.0])
     off = np.abs(np.log(intervals / wanted))

@@ -17,7 +17,7 @@ from shipgym.sea.conditions import Weather, as_weather
 from shipgym.ships.manoeuvring_model import ship_of
 from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.definition import TaskDefinition, read_definition
-from shipgym.tasks.scales import control_interval
+from shipgym.tasks.scales import control_interval, rounded_interval
 
 Sea = str | Weather
 
@@ -77,7 +77,7 @@ class Task:
         any weather; of several one is drawn for each episode.
     dt : float or None
         Control interval, s; by default about a twentieth of the time to travel one ship
-        length, rounded to 1, 2 or 5 times a power of ten.
+        length, or as the task's file says, rounded to 1, 2 or 5 times a power of ten.
     episode_steps : int
         Control intervals after which an episode is truncated.
     max_envelope_distance : float
@@ -250,7 +250,9 @@ class Task:
 
     def interval(self, model: ShipModel) -> float:
         """Control interval for a ship, s."""
-        return control_interval(model) if self.dt is None else float(self.dt)
+        if self.dt is not None:
+            return float(self.dt)
+        return rounded_interval(model.travel_time, self.definition.steps_per_length)
 
     def substeps(self, model: ShipModel) -> int:
         """Steps of the integration in a control interval."""
@@ -360,7 +362,7 @@ class Task:
         """Control intervals that the end of an episode stands for."""
         if self.loss_horizon is not None:
             return float(self.loss_horizon)
-        return LOSS_HORIZON if self.bounded else float("inf")
+        return LOSS_HORIZON if self.bounded else float(self.episode_steps)
 
     def least_shaft(self, model: ShipModel) -> float:
         """Least command of the shaft, part of service speed; 0 if it stays ahead."""

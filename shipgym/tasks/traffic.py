@@ -98,13 +98,6 @@ def target_of(motion: Motion) -> Target:
     )
 
 
-def distance_to(motion: Motion, target: Target) -> float:
-    """Distance of another ship, m."""
-    away_x = target.x - motion.x
-    away_y = target.y - motion.y
-    return sqrt(away_x * away_x + away_y * away_y)
-
-
 def approach(motion: Motion, target: Target) -> Approach:
     """How a ship in still water, and another, approach each other."""
     away_x = target.x - motion.x
@@ -124,7 +117,7 @@ def approach(motion: Motion, target: Target) -> Approach:
     to_other = arctan2(away_y, away_x)
     to_own = arctan2(-away_y, -away_x)
     return Approach(
-        distance=distance_to(motion, target),
+        distance=sqrt(away_x * away_x + away_y * away_y),
         bearing=wrap(to_other - motion.psi),
         aspect=wrap(to_own - target.course),
         dcpa=sqrt(squared_dcpa),
@@ -158,25 +151,6 @@ def rudder_to(motion: Motion, heading: float, ship: Ship) -> float:
     lead = 2.0 * ship.length / ship.speed  # s
     limit = ship.rudder_limit
     return clip(error - lead * motion.r, -limit, limit)
-
-
-def rudder_by_rules(
-    motion: Motion,
-    other: Target,
-    course: float,
-    safe: float,
-    ship: Ship,
-) -> float:
-    """Rudder of a helmsman who keeps a course, and gives way by COLREG, rad.
-
-    He alters course to starboard while another ship that he has to keep clear of would
-    come closer than `safe`, m, within twelve times that he travels his length.
-    """
-    risk_time = 12.0 * ship.length / ship.speed
-    kind = encounter(approach(motion, other), safe, risk_time)
-    gives_way = (kind == GIVE_WAY) | (kind == HEAD_ON) | (kind == OVERTAKING)
-    alteration = 0.7  # rad
-    return rudder_to(motion, course + pick(gives_way, alteration, 0.0), ship)
 
 
 def sail_steps(motion: Motion, rudder: float, shaft: float, dt: float) -> Motion:

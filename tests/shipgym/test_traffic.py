@@ -7,17 +7,68 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-from stable_baselines3 import PPO
 
-from shipgym import InputError, ShipVecEnv, check_task, load_model
+from shipgym import InputError, check_task, load_model
 from shipgym.engine.motion import Motion
 from shipgym.tasks import traffic
-from shipgym.tasks.encounters import IMAZU
 from shipgym.tasks.shapes import Circle, Line, ShipOutline
 from shipgym.tasks.traffic import Target
 
 ROOT = Path(__file__).parents[2]
-ENCOUNTER = (ROOT / "shipgym" / "examples" / "encounter.py").read_text(encoding="utf-8")
+FERRY = '''
+"""A ferry who crosses ahead, by equations of her own."""
+from typing import Annotated, NamedTuple
+
+from shipgym.engine.motion import Motion
+from shipgym.tasks.contract import ObservationSpec, Setting, at_service_speed
+from shipgym.tasks.shapes import ChartWidth, Circle, ShipOutline
+from shipgym.tasks.traffic import approach, rudder_to, target_of, vessel
+
+ferry = vessel("mariner")
+FERRY, AT_SPEED = ferry.ship, ferry.start
+
+
+class Settings(NamedTuple):
+    ahead: Annotated[float, Setting("Of own ship at the start, lengths.")] = 8.0
+
+
+class State(NamedTuple):
+    ferry: Motion
+
+
+class Reward(NamedTuple):
+    closeness: float
+
+
+class Observation(NamedTuple):
+    dcpa: Annotated[
+        float, ObservationSpec(0, 9, "m", lambda ship, _: ship.length)
+    ]
+
+
+def begin(ship, settings, random, plan):
+    ahead = settings.ahead * ship.length
+    ferry = Motion(ahead, -ahead, 1.57, *AT_SPEED[3:])
+    return at_service_speed(0.0, 0.0, 0.0, ship), State(ferry)
+
+
+def step(motion, state, interval, ship, settings):
+    rudder = rudder_to(state.ferry, 1.57, FERRY)
+    after = ferry(state.ferry, rudder, AT_SPEED.n, interval.dt)
+    near = approach(motion, target_of(after))
+    return State(after), Reward(-ship.length / near.distance), False, False
+
+
+def observe(readings, state, interval, ship, settings):
+    return Observation(approach(readings, target_of(state.ferry)).dcpa)
+
+
+def draw(motion, state, ship, settings):
+    at = state.ferry.x, state.ferry.y
+    outline = ShipOutline(*at, state.ferry.psi, ship.length, None, "danger")
+    shapes = [ChartWidth(20 * ship.length), outline, Circle(*at, ship.length)]
+    return shapes
+'''
 COURSE = "shipgym/CourseKeeping-v0"
 
 
@@ -67,34 +118,6 @@ def test_encounters_by_the_rules(other, dcpa, tcpa, kind):
     assert np.hypot(later.x - 5.0 * tcpa, later.y) == pytest.approx(dcpa, abs=1e-3)
 
 
-def test_the_cases_of_imazu_are_collisions():
-    """A ship who keeps her course is met by the first in each case."""
-    assert IMAZU.shape == (22, 3)
-    n_others = np.isfinite(IMAZU).sum(axis=1).tolist()
-    assert n_others == [1] * 4 + [2] * 7 + [3] * 11
-    task = ROOT / "shipgym" / "examples" / "encounter.py"
-    ship = gymnasium.make(COURSE, task=task, dt=5.0, model="mariner", scatter=0.0)
-    for case in range(1, 23):
-        seen, _ = ship.reset(seed=0, options={"case": case})
-        collided = False
-        for _ in range(70):
-            rudder = -3.0 * seen[:1] - seen[2:3]
-            seen, _, collided, *_ = ship.step(np.clip(rudder, -1.0, 1.0))
-            if collided:
-                break
-        assert collided, case
-
-
-def test_the_example_is_a_task_of_one_screen_that_is_learned(tmp_path):
-    assert ENCOUNTER.count("\n") < 122
-    path = ROOT / "shipgym" / "examples" / "encounter.py"
-    assert str(check_task(path, dt=5.0)) == "encounter: sound"
-    ships = ShipVecEnv(COURSE, num_envs=4, seed=0, task=path, dt=5.0)
-    agent = PPO("MlpPolicy", ships, n_steps=16, batch_size=32, n_epochs=1)
-    agent.learn(128)
-    assert agent.num_timesteps == 128
-
-
 def test_a_target_that_leaves_the_physical_range_is_named(tmp_path):
     tug = re.search(
         r'```python\n("""Tug.*?)```',
@@ -103,10 +126,10 @@ def test_a_target_that_leaves_the_physical_range_is_named(tmp_path):
     )[1]
     wild = tug.replace("X_uu: float = -0.0025", "X_uu: float = 0.5")
     (tmp_path / "tug.py").write_text(wild.replace('"tug"', '"wild tug"'))
-    path = tmp_path / "encounter.py"
-    path.write_text(ENCOUNTER.replace('"mariner"', repr(str(tmp_path / "tug.py"))))
+    path = tmp_path / "ferry.py"
+    path.write_text(FERRY.replace('"mariner"', repr(str(tmp_path / "tug.py"))))
     message = (
-        r"encounter.py, line \d+, in step: State\.[a-z.1]+: expected a target ship"
+        r"ferry.py, line \d+, in step: State\.[a-z.1]+: expected a target ship"
         r" within the physical range.* at step \d+.*tug.py, line \d+, in accelerations"
     )
     with pytest.raises(InputError, match=message):
@@ -116,25 +139,23 @@ def test_a_target_that_leaves_the_physical_range_is_named(tmp_path):
 
 
 def test_a_task_draws_what_it_wants_shown(tmp_path):
-    path = tmp_path / "encounter.py"
-    path.write_text(ENCOUNTER)
-    plain = ENCOUNTER[: ENCOUNTER.index("def draw(")]
+    path = tmp_path / "ferry.py"
+    path.write_text(FERRY)
+    plain = FERRY[: FERRY.index("def draw(")]
     (tmp_path / "plain.py").write_text(plain)
     pictures = []
-    for name in ("encounter.py", "plain.py"):
+    for name in ("ferry.py", "plain.py"):
         env = gymnasium.make(
-            COURSE, task=tmp_path / name, dt=5.0, case=2, render_mode="rgb_array"
+            COURSE, task=tmp_path / name, dt=5.0, render_mode="rgb_array"
         )
         env.reset(seed=0)
         pictures.append(env.render())
     assert pictures[0].shape == (600, 600, 3)
     assert np.any(pictures[0] != pictures[1])
-    many = gymnasium.make_vec(
-        COURSE, 2, task=path, dt=5.0, case=2, render_mode="rgb_array"
-    )
+    many = gymnasium.make_vec(COURSE, 2, task=path, dt=5.0, render_mode="rgb_array")
     many.reset(seed=0)
     np.testing.assert_array_equal(many.render()[0], pictures[0])
-    path.write_text(ENCOUNTER.replace("    return shapes\n", "    return [1.0]\n"))
+    path.write_text(FERRY.replace("    return shapes\n", "    return [1.0]\n"))
     (problem,) = check_task(path, dt=5.0).problems
     assert "in draw: expected a list of Line, Circle" in problem
 
