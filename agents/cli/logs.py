@@ -211,8 +211,26 @@ def _entry(
     return {
         "file": _toml_paths(guess.paths, folder),
         "columns": own,
+        "manoeuvres": _manoeuvres(guess),
         "decision": next(iter(of_trial), None),
     }
+
+
+def _manoeuvres(guess: TrialGuess) -> int:
+    """Number of manoeuvres in a log that is idle for a third of its time or more."""
+    import numpy as np
+
+    from shipgym.trials.cuts import active_stretches
+
+    trial = guess.trial
+    if trial is None or "delta" not in trial:
+        return 0
+    is_idle = abs(float(np.median(trial["delta"]))) < 0.05  # rad
+    if not is_idle:
+        return 0
+    stretches = active_stretches(trial.t, trial["delta"])
+    active = sum(float(last) - float(first) for first, last in stretches)
+    return len(stretches) if active < trial.duration / 1.5 else 0
 
 
 def _columns(guessed: TrialGuess) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from shipgym.arrays import Floats
 from shipgym.checks import shown
 from shipgym.errors import InputError
 from shipgym.trials.clock_texts import DAY, clock_text, is_dated, read_clock
@@ -14,6 +15,8 @@ _EXPECTED = (
     'expected cut = "rudder", or stretches in seconds or clock time: [[60, 360],'
     ' ["09:30:00", "09:41:30"]]'
 )
+
+_SHORTEST = 30.0  # s, of a manoeuvre
 
 
 class Stretch(NamedTuple):
@@ -47,7 +50,13 @@ def cut_log(cut: Any, log: Log, where: str) -> list[slice]:
     clock.
     """
     if cut == "rudder":
-        stretches = _active_stretches(log, where)
+        stretches = active_stretches(log.t, log.channels.get("delta"))
+        if not stretches:
+            raise InputError(
+                f'{where} cut: expected with "rudder" manoeuvres, in which the rudder'
+                f" is more than 3 deg from its usual place for over {_SHORTEST:g} s,"
+                " got none; give the stretches, or read another log"
+            )
     else:
         stretches = [Stretch(first, last) for first, last in cut]
     parts = []
@@ -104,28 +113,25 @@ def _seconds(moment: float | str, log: Log, where: str) -> float:
     return after - DAY if is_before else after
 
 
-def _active_stretches(log: Log, where: str) -> list[Stretch]:
-    """Stretch from before the rudder leaves its usual place until it is quiet again."""
+def active_stretches(t: Floats, delta: Floats | None) -> list[Stretch]:
+    """Stretches from before a rudder leaves its usual place until it is quiet again.
+
+    Time, s, and rudder, rad, of shape (n_samples,); none without a rudder.
+    """
+    if delta is None:
+        return []
     largest_swing = 3.0 * DEGREE  # of a rudder that is at its usual place
     longest_pause = 60.0  # s, within a manoeuvre
-    shortest = 30.0  # s
     margin = 30.0  # s, before and after
-    delta = log.channels.get("delta", np.zeros(log.t.size))
     swing = np.abs(delta - np.median(delta))
-    active = log.t[swing > largest_swing]
+    active = t[swing > largest_swing]
     is_pause = np.diff(active) > longest_pause
     ends = np.flatnonzero(is_pause) + 1
 
     stretches = []
     for moments in np.split(active, ends):
-        if moments.size and np.ptp(moments) > shortest:
+        if moments.size and np.ptp(moments) > _SHORTEST:
             first = float(moments[0]) - margin
             last = float(moments[-1]) + margin
             stretches.append(Stretch(first, last))
-    if not stretches:
-        raise InputError(
-            f'{where} cut: expected with "rudder" manoeuvres, in which the rudder is'
-            f" more than 3 deg from its usual place for over {shortest:g} s, got none;"
-            " give the stretches, or read another log"
-        )
     return stretches

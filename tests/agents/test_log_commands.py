@@ -179,3 +179,18 @@ def test_a_length_that_no_ship_has_is_refused_before_a_log_is_read(
     assert code == 2
     assert "'--length'" in said
     assert not (log / "ship.toml").exists()
+
+
+@pytest.mark.parametrize("idle", [0, 600])
+def test_cuts_are_proposed_for_a_log_with_idle_parts(log, monkeypatch, capsys, idle):
+    first, *rows = (log / "log.csv").read_text().splitlines()
+    quiet = [f"{30.0 + 0.01 * np.sin(0.1 * k):.3f};0.0" for k in range(idle)]
+    moved = [";".join(row.split(";")[1:]).replace(",", ".") for row in rows]
+    lines = [f"{k};{cells}" for k, cells in enumerate([*quiet, *moved, *quiet])]
+    (log / "idle.csv").write_text("\n".join([first, *lines]))
+    command(monkeypatch, capsys, "new-ship", "idle.csv", "--length", "150")
+    written = (log / "ship.toml").read_text()
+    assert ('\ncut = "rudder"' in written) == bool(idle)
+    if idle:
+        (trial,) = ShipFile.load(log / "ship.toml").trials()
+        assert 300.0 <= trial.duration <= 400.0
