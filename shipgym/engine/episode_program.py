@@ -12,6 +12,7 @@ from shipgym.engine.compiling import compiled, plain_python
 from shipgym.engine.envelope import Envelope
 from shipgym.engine.extra_arguments import completed
 from shipgym.engine.lane_records import (
+    CONSTRAINT,
     Commands,
     EpisodeCounters,
     Outcome,
@@ -67,7 +68,7 @@ class EpisodeProgram:
         return Layout(
             outcome=Outcome,
             reward=self.task.Reward,
-            reported=(self.task.State, self.task.reported),
+            reported=(self.task.State, self.task.stored),
             observation=self.task.Observation,
             **(stages.BETWEEN_STAGES if self.ship.staged else {}),
         )
@@ -110,8 +111,9 @@ class EpisodeProgram:
         """Row of an entry of `info` among the results."""
         rows = self.result_rows
         part = name.removeprefix("reward_")
-        if name in self.task.reported:
-            return rows["reported"].row(name)
+        constraint = name.removeprefix(CONSTRAINT)
+        if name in self.task.reported or constraint != name:
+            return rows["reported"].row(constraint)
         if name in Outcome._fields or part == "end":
             return rows["outcome"].row(part)
         parts = self.task.reward_names

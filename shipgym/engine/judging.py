@@ -186,6 +186,7 @@ def judge(
         steps=counters.steps,
         ended=pick(just_ended, 1.0, counters.ended),
         ran_away=counters.ran_away,
+        episode_cost=counters.episode_cost + outcome.cost,
     )
     store_counters(tile.state, lane, counters)
     store_outcome(tile.result, lane, outcome)

@@ -2,6 +2,8 @@
 
 from typing import Any, NamedTuple
 
+CONSTRAINT = "constraint_"  # prefix of the names of constraints in `Engine.info`
+
 
 class Rules(NamedTuple):
     """Settings of the engine."""
@@ -29,6 +31,7 @@ class EpisodeCounters(NamedTuple):
     steps: float  # control intervals so far
     ended: float  # 1 once the episode is over
     ran_away: float  # 1 if the ship left every physical range in the interval
+    episode_cost: float  # sum of the costs so far
 
 
 class Outcome(NamedTuple):

@@ -86,6 +86,7 @@ def take_commands(tile: Tile, actions: Any, n_ships: int) -> None:
             steps=before.steps + (1.0 - before.ended),
             ended=before.ended,
             ran_away=0.0,
+            episode_cost=before.episode_cost,
         )
         store_commands(state, lane, commands)
         store_counters(state, lane, counters)
@@ -138,6 +139,7 @@ def end_substep(tile: Tile, lane: int, after: Motion, h: float, ship: Ship) -> N
         steps=counters.steps,
         ended=counters.ended,
         ran_away=pick(away, 1.0, counters.ran_away),
+        episode_cost=counters.episode_cost,
     )
     if HAS_SEA:
         evolve_sea(tile, lane, motion, h, over)

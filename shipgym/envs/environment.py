@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from shipgym.arrays import Flags
 from shipgym.checks import (
     check_choice,
+    check_flag,
     check_keys,
     did_you_mean,
     quoted,
@@ -172,6 +173,14 @@ class ShipsEnv:
             given["task"], given["model"], options, taken
         )
         self.pace = Pace(*(given[name] for name in PACE))
+        self._constraints = self.task.constraints
+        self._constraint_cost = check_flag(given["constraint_cost"], "constraint_cost")
+        if self._constraint_cost and not self._constraints:
+            raise InputError(
+                "constraint_cost: expected a task with constraints, got"
+                f" {self.task.name!r}, which has none as it is asked; a ship that rolls"
+                " has one with roll=True"
+            )
         num_envs = given.get("num_envs", 1)
         self._own_engine = Engine(
             self.model,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.arrays import Flags, Floats
+from shipgym.engine.lane_records import CONSTRAINT
 from shipgym.engine.memory import WORD, allocated
 
 ANSWER_OUTCOMES = 3  # reward, terminated, truncated: rows before those of `info`
@@ -29,6 +30,39 @@ class Outputs:
     def take(self, other: Self) -> None:
         """Copy the content of others."""
         self.memory[:] = other.memory
+
+
+class LastInfo(dict[str, Any]):
+    """Info of a step in which an episode ended; `info["episode"]["cost"]` is its cost.
+
+    The entry is not stored: Gymnasium's RecordEpisodeStatistics refuses an info that
+    holds one. What that, or stable-baselines3's Monitor, stores there gets the cost.
+    """
+
+    def __missing__(self, key: str) -> Any:
+        if key != "episode":
+            raise KeyError(key)
+        return {"cost": self.get("final_info", self)["episode_cost"]}
+
+    def __setitem__(self, key: str, value: Any) -> None:
+        if key == "episode":
+            value = {**self.__missing__(key), **value}
+        super().__setitem__(key, value)
+
+
+def gather_constraints(
+    info: dict[str, Any],
+    names: Sequence[str],
+    as_cost: bool,
+) -> None:
+    """Move constraints into `info["constraints"]`; with `as_cost` they are the cost.
+
+    What was the cost is then the `objective`.
+    """
+    info["constraints"] = {name: info.pop(f"{CONSTRAINT}{name}") for name in names}
+    if as_cost:
+        info["objective"] = info["cost"]
+        info["cost"] = sum(info["constraints"].values())
 
 
 class OutputPool:

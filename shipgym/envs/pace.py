@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from shipgym.arrays import Flags
 from shipgym.checks import check_number, check_whole
 from shipgym.engine.episodes import REFUSED
+from shipgym.engine.lane_records import CONSTRAINT
 from shipgym.envs.engine import Engine
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES
 from shipgym.errors import InputError
@@ -67,7 +68,7 @@ class Pace:
 
 
 class PacedSteps:
-    """Steps of an engine at a pace: reward, cost and their parts are sums.
+    """Steps of an engine at a pace: rewards, costs and constraints are sums.
 
     Where an episode ends inside a step, its ship stays as she is for the rest of it.
     """
@@ -77,8 +78,10 @@ class PacedSteps:
         self.repeat = pace.action_repeat
         self.rate = NO_LIMIT if pace.rate_limit is None else pace.rate_limit
         names = engine.task.info_names
-        summed = ("cost", *engine.task.reward_parts)
-        self._summed = [0, *(ANSWER_OUTCOMES + names.index(name) for name in summed)]
+        self._summed = [0]
+        for row, name in enumerate(names, start=ANSWER_OUTCOMES):
+            if name == "cost" or name.startswith(("reward_", CONSTRAINT)):
+                self._summed.append(row)
 
     def advance(self, begin_ended: bool = False, anew: bool = False) -> int:
         """Take a step, arguments and errors as in `Engine.advance`."""

@@ -93,8 +93,8 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
     The list of infos is the same in every step; its dictionaries are empty except for
     episodes that ended: those hold what the single environment's `info` does,
     `terminal_observation`, `TimeLimit.truncated`, `episode` as stable-baselines3's
-    Monitor writes it (return `r`, length `l`, time `t`) and, where paths are followed,
-    `is_success`. Copy the list to keep infos beyond the next step.
+    Monitor writes it (return `r`, length `l`, time `t`), and its `cost`. Copy the list
+    to keep infos beyond the next step.
 
     Raises InputError for an environment that is not native, an unknown keyword or a
     value out of its range, or options together with an existing environment.
@@ -210,14 +210,13 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
     def _last_info(self, row: int, infos: Infos, truncated: bool) -> dict[str, Any]:
         """Info of a row whose episode ended."""
         info = _info_of(infos["final_info"], row)
-        if "success" in info:
-            info["is_success"] = info["success"]  # read by stable-baselines3's log
         info["terminal_observation"] = infos["final_obs"][row]
         info["TimeLimit.truncated"] = truncated
         info["episode"] = {
             "r": round(float(self._returns[row]), 6),
             "l": int(self._lengths[row]),
             "t": round(time.time() - self._started, 6),
+            "cost": info["episode_cost"],
         }
         return info
 
@@ -283,9 +282,10 @@ def _info_of(infos: Infos, row: int) -> dict[str, Any]:
     """One row of Gymnasium's arrays, as the single environment's info."""
     info = {}
     for name, values in infos.items():
-        if name.startswith(("_", "final_")) or isinstance(values, dict):
+        if name.startswith(("_", "final_")):
             continue  # masks, and the last values of ended episodes
-        info[name] = values[row].item()
+        is_group = isinstance(values, dict)
+        info[name] = _info_of(values, row) if is_group else values[row].item()
     return info
 
 

@@ -19,7 +19,7 @@ from shipgym.envs.environment import (
     ShipsEnv,
     given_orders,
 )
-from shipgym.envs.outputs import ANSWER_OUTCOMES
+from shipgym.envs.outputs import ANSWER_OUTCOMES, LastInfo, gather_constraints
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.tasks.task import ENV_OPTIONS
@@ -62,6 +62,9 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         n_observations) as Gymnasium's FrameStackObservation has it; the "MlpPolicy" of
         stable-baselines3 takes it. An episode begins with its first observation in
         each.
+    constraint_cost : bool
+        Whether `info["cost"]` is the sum of the constraints, as libraries of safe
+        learning read it; the steering cost is then `info["objective"]`.
     **options
         Settings of the task, fields of `Task` and of `Randomisation`; `reward` and
         `sensors`, files with a reward and a sensor set of your own
@@ -82,6 +85,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         action_repeat: int = 1,
         rate_limit: float | None = None,
         frame_stack: int = 1,
+        constraint_cost: bool = False,
         **options: Any,
     ) -> None:
         arguments = locals()
@@ -179,7 +183,9 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         terminated, truncated : bool
         info : dict
             The cost and its parts, `heading_error` in rad, `envelope_distance`,
-            `extrapolating`, and what the environment's page names.
+            `extrapolating`, `constraints`, and what the environment's page names. At
+            the end of an episode also `episode_cost`, which is
+            `info["episode"]["cost"]` too, and `is_success`.
         """
         if not self._begun:
             self._refuse_step()
@@ -202,6 +208,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             terminated, truncated = self._end
         elif terminated or truncated:
             self._note_end((terminated, truncated))
+            info = self._last(info, terminated > 0.0)
         return seen, reward, terminated > 0.0, truncated > 0.0, info
 
     def _seen(self, begun: Flags | None = None) -> Observation:
@@ -212,6 +219,12 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             shown = self._frames.shown if self._over else self._shown(begun)
             seen = shown[0]
         return seen.copy()
+
+    def _last(self, info: dict[str, Any], terminated: bool) -> LastInfo:
+        """Info of a step in which the episode ended."""
+        cost = float(self._engine.read("episode_cost")[0])
+        success = info.get("success", not terminated)
+        return LastInfo({**info, "episode_cost": cost, "is_success": success})
 
     def _note_end(self, end: Any = (0.0, 0.0)) -> None:
         """Note how an episode ended, terminated or truncated; neither: it goes on."""
@@ -238,6 +251,8 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         info: dict[str, Any] = dict(zip(self._names, numbers, strict=False))
         for flag in self._flags:
             info[flag] = info[flag] > 0.0
+        if self._constraints:
+            gather_constraints(info, self._constraints, self._constraint_cost)
         return info
 
     def _order(self, action: Any) -> None:

@@ -19,7 +19,7 @@ from shipgym.envs.environment import (
     ShipsEnv,
     given_orders,
 )
-from shipgym.envs.outputs import named_rows
+from shipgym.envs.outputs import LastInfo, gather_constraints, named_rows
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.tasks.task import VECTOR_OPTIONS
@@ -49,7 +49,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         When the next episode of a row begins.
     threads : int
         Number of threads that share the rows; the results do not depend on it.
-    action_repeat, rate_limit, frame_stack, **options
+    action_repeat, rate_limit, frame_stack, constraint_cost, **options
         As for the single environment.
     """
 
@@ -65,6 +65,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         action_repeat: int = 1,
         rate_limit: float | None = None,
         frame_stack: int = 1,
+        constraint_cost: bool = False,
         **options: Any,
     ) -> None:
         arguments = locals()
@@ -86,7 +87,6 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         self.autoreset_mode = mode  # read by TorchRL
         self._names = self.task.info_names
         self._flags = self._engine.flag_names
-        self._masks = {f"_{name}": self._engine.all_lanes for name in self._names}
         self._own_reward = not self.task.definition.shipped
         self._some_over = False  # NEXT_STEP: whether episodes ended in the last step
         self._keeps_ends = mode is AutoresetMode.DISABLED
@@ -147,9 +147,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         self._over = self._over & ~mask
         engine.begin(self._keys, episodes, mask)
         self._draw(mask)
-        infos = self._infos()
-        for name in self._masks:
-            infos[name] = mask.copy()
+        infos = self._infos(mask.copy())
         return self._shown(mask), infos
 
     def _next_episodes(
@@ -171,11 +169,28 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
                 numbers[row] = 0
         return keys, numbers
 
-    def _infos(self) -> Infos:
+    def _infos(self, mask: Flags, outcomes: Any = None, flags: Any = None) -> Infos:
         """Rows of the last step's arrays by name, with their masks."""
         outputs = self._engine.outputs
-        rows = named_rows(outputs.outcomes, outputs.flags, self._names, self._flags)
-        return rows | self._masks
+        if outcomes is None:
+            outcomes, flags = outputs.outcomes, outputs.flags
+        infos = named_rows(outcomes, flags, self._names, self._flags)
+        if self._constraints:
+            gather_constraints(infos, self._constraints, self._constraint_cost)
+            masks = {f"_{name}": mask for name in self._constraints}
+            infos["constraints"] |= masks
+        return infos | {f"_{name}": mask for name in infos}
+
+    def _note_ends(self, infos: Infos, ended: Flags) -> LastInfo:
+        """Add the cost of episodes that ended, and whether they were a success."""
+        outputs = self._engine.outputs
+        costs = self._engine.read("episode_cost")
+        success = infos.get("success", outputs.truncated)
+        more = {
+            "episode_cost": np.where(ended, costs, 0.0),
+            "is_success": success & ended,
+        }
+        return LastInfo({**infos, **more, **{f"_{name}": ended for name in more}})
 
     def _mask(self, options: dict[str, Any] | None) -> Flags:
         """Rows in which an episode is to begin; InputError for another mask."""
@@ -226,7 +241,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         terminated, truncated : bool arrays of shape (num_envs,)
         infos : dict
             Arrays of shape (num_envs,) with their masks; `final_obs` and `final_info`
-            of episodes that ended where the next one begins in the same step.
+            of episodes that ended where the next one begins in the same step;
+            `episode_cost` and `is_success` with the last info.
         """
         if not self._begun:
             self._refuse_step()
@@ -244,16 +260,18 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             engine.refuse_rewards()
 
         observations = self._shown()
-        infos = self._infos()
-        if self.autoreset_mode is AutoresetMode.NEXT_STEP:
-            self._some_over = n_ended > 0
-        elif n_ended and self.autoreset_mode is AutoresetMode.SAME_STEP:
+        infos = self._infos(engine.all_lanes)
+        self._some_over = n_ended > 0 and not self._keeps_ends
+        if n_ended:
             ended = outputs.terminated | outputs.truncated
-            infos |= self._final(observations, ended)
-            engine.begin_next(ended)
-            observations = self._shown(ended)
-        elif self._keeps_ends and n_ended:
-            self._over = outputs.terminated | outputs.truncated
+            if self.autoreset_mode is AutoresetMode.SAME_STEP:
+                self._some_over = False
+                infos = LastInfo({**infos, **self._final(observations, ended)})
+                engine.begin_next(ended)
+                observations = self._shown(ended)
+            else:
+                infos = self._note_ends(infos, ended)
+                self._over = ended & self._keeps_ends
         self._draw()
         return (
             observations,
@@ -281,12 +299,11 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         # zero in the rows that go on, as in Gymnasium's vector environments
         outcomes = np.where(ended, outputs.outcomes, 0.0)
         flags = outputs.flags & ended
-        final_info = named_rows(outcomes, flags, self._names, self._flags)
-        masks = {f"_{name}": ended for name in final_info}
+        final_info = self._infos(ended, outcomes, flags)
         return {
             "final_obs": final_obs,
             "_final_obs": ended,
-            "final_info": final_info | masks,
+            "final_info": self._note_ends(final_info, ended),
             "_final_info": ended,
         }
 

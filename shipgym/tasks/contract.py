@@ -27,7 +27,11 @@ and may define
 * `NAME`, by default that of the file; `EPISODE_STEPS`, by default 600; and
   `STEPS_PER_LENGTH`, control intervals in the time to travel a length, by default 20.
 * `REPORTED`: names of fields of `State` that `info` has; those annotated `Flag` as
-  booleans.
+  booleans. A task whose episodes can end well reports `success`.
+* `CONSTRAINTS`: names of fields of `State` that are constraints, apart from the cost:
+  how far the ship is beyond a limit, in parts of the limit, 0 where she keeps it.
+  `info["constraints"]` has them by name, `Engine.info` as `constraint_NAME`. A field
+  `heel` is one only with `roll=True`.
 * `plan_length(settings) -> int`: how many numbers `plan` holds, an array that lasts
   over an episode.
 * `check(settings, model)`: raises `InputError` for settings that do not fit, first

@@ -27,6 +27,7 @@ from shipgym.tasks.steering import (
     SteeringSignals,
     Weights,
     extras,
+    heel_excess,
     helm,
     integrated,
     steering_reward,
@@ -34,6 +35,7 @@ from shipgym.tasks.steering import (
 
 NAME = "CourseKeeping"
 REPORTED = ("heading_error",)
+CONSTRAINTS = ("heel",)
 
 
 class Settings(NamedTuple):
@@ -95,6 +97,7 @@ class State(NamedTuple):
     changes: float  # how many there were
     integral: float  # of the heading error, rad s
     heading_error: float  # rad
+    heel: float  # beyond the limit, in parts of it
 
 
 class Reward(NamedTuple):
@@ -128,6 +131,7 @@ def begin(
         changes=0.0,
         integral=0.0,
         heading_error=0.0,
+        heel=0.0,
     )
     state = changed(before, 0.0, settings, random)
     return motion, State(
@@ -136,6 +140,7 @@ def begin(
         changes=1.0,
         integral=0.0,
         heading_error=wrap(state.heading_setpoint - heading),
+        heel=0.0,
     )
 
 
@@ -157,6 +162,7 @@ def changed(state: State, steps: float, settings: Settings, random: Random) -> S
         changes=state.changes + 1.0,
         integral=state.integral,
         heading_error=state.heading_error,
+        heel=state.heel,
     )
 
 
@@ -208,6 +214,7 @@ def step(
         changes=state.changes,
         integral=integral,
         heading_error=error,
+        heel=heel_excess(motion, weights),
     )
     lost = fabs(error) > radians(settings.max_heading_error_deg)
     return after, reward, lost, False

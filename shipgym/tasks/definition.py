@@ -130,6 +130,8 @@ class TaskDefinition(Configurable):
         Shapes for pictures (`shipgym.tasks.shapes`).
     reported : tuple of str
         Fields of the state that `info` has.
+    constraints : tuple of str
+        Fields of the state that `info["constraints"]` has.
     episode_steps : int
         Control intervals after which an episode is truncated, by default.
     steps_per_length : float
@@ -149,6 +151,7 @@ class TaskDefinition(Configurable):
     check: Callable[[Any, Any], None] = no_check
     listed: Callable[[Any], Any] = np.asarray
     reported: tuple[str, ...] = ()
+    constraints: tuple[str, ...] = ()
     episode_steps: int = 600
     steps_per_length: float = STEPS_PER_LENGTH
     current: Callable[..., Any] | None = None
@@ -163,6 +166,11 @@ class TaskDefinition(Configurable):
     def observations(self) -> dict[str, ObservationSpec]:
         """Bounds, unit and scale of each observation, by its path in `Observation`."""
         return _observations(self.Observation)
+
+    @property
+    def stored(self) -> tuple[str, ...]:
+        """Fields of the state that are reported, constraints among them."""
+        return (*self.reported, *self.constraints)
 
     @cached_property
     def flags(self) -> tuple[str, ...]:
@@ -281,6 +289,7 @@ def _definition_of(namespace: Any, where: str) -> TaskDefinition:
         name=getattr(namespace, "NAME", Path(where).stem),
         source=where,
         reported=tuple(getattr(namespace, "REPORTED", ())),
+        constraints=tuple(getattr(namespace, "CONSTRAINTS", ())),
         episode_steps=getattr(namespace, "EPISODE_STEPS", TaskDefinition.episode_steps),
         steps_per_length=getattr(namespace, "STEPS_PER_LENGTH", STEPS_PER_LENGTH),
         **found,
@@ -297,7 +306,8 @@ def _check_task(namespace: Any, where: str) -> None:
         functions=FUNCTIONS,
         optional=[name for name in FUNCTIONS if name not in needed],
     )
-    _check_reported(namespace, where)
+    for name in ("REPORTED", "CONSTRAINTS"):
+        _check_reported(namespace, name, where)
     if hasattr(namespace, "NAME"):
         check_text(namespace.NAME, f"{where}: NAME")
     if hasattr(namespace, "EPISODE_STEPS"):
@@ -308,10 +318,10 @@ def _check_task(namespace: Any, where: str) -> None:
         check_number(steps, f"{where}: STEPS_PER_LENGTH", at_least=0.2)
 
 
-def _check_reported(namespace: Any, where: str) -> None:
+def _check_reported(namespace: Any, table: str, where: str) -> None:
     """Check which fields of a state are to be reported."""
-    reported = getattr(namespace, "REPORTED", ())
-    where = f"{where}: REPORTED"
+    reported = getattr(namespace, table, ())
+    where = f"{where}: {table}"
     expected = f"a tuple of fields of State, none of {TAKEN}, each a number"
     if not isinstance(reported, tuple | list):
         raise unexpected(where, expected, reported)

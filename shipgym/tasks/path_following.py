@@ -46,6 +46,7 @@ from shipgym.tasks.steering import (
     SteeringSignals,
     Weights,
     extras,
+    heel_excess,
     helm,
     integrated,
     rudder_activity,
@@ -63,6 +64,7 @@ REPORTED = (
     "rudder_travel",
     "reversals_per_minute",
 )
+CONSTRAINTS = ("corridor", "heel")
 EPISODE_STEPS = 1500
 
 WORST_PROGRESS = 2.0  # cost of a step against the path
@@ -151,6 +153,8 @@ class State(NamedTuple):
     rudder_activity: RudderActivity
     rudder_travel: float  # rad, by which the rudder has turned in all
     reversals_per_minute: float  # mean since the start
+    corridor: float  # distance beyond its edge, in parts of its half width
+    heel: float  # beyond the limit, in parts of it
 
 
 class Reward(NamedTuple):
@@ -341,6 +345,8 @@ def begin(
         rudder_activity=RudderActivity(0.0, 0.0, 0.0),
         rudder_travel=0.0,
         reversals_per_minute=0.0,
+        corridor=0.0,
+        heel=0.0,
     )
     return motion, state
 
@@ -389,6 +395,8 @@ def on_event(
         rudder_activity=state.rudder_activity,
         rudder_travel=state.rudder_travel,
         reversals_per_minute=state.reversals_per_minute,
+        corridor=state.corridor,
+        heel=state.heel,
     )
 
 
@@ -424,6 +432,8 @@ def step(
         rudder_activity=activity,
         rudder_travel=state.rudder_travel + travel,
         reversals_per_minute=activity.reversals / minutes_of(interval),
+        corridor=max(off / settings.corridor - 1.0, 0.0),
+        heel=heel_excess(motion, settings.weights),
     )
     made_now = after.distance_made_good - state.distance_made_good
     reward = Reward(

@@ -48,6 +48,9 @@ class Weights(NamedTuple):
     roll_free_deg: Annotated[
         float, Setting("Heel that costs nothing, degrees.", at_least=0.0)
     ] = 0.0
+    heel_limit_deg: Annotated[
+        float, Setting("Heel that the constraint `heel` allows, degrees.", above=0.0)
+    ] = 10.0
     envelope_weight: Annotated[
         float, Setting("Cost of a step in which the model extrapolates.", at_least=0.0)
     ] = 0.0
@@ -66,6 +69,12 @@ class Weights(NamedTuple):
 DEFAULTS = Weights()
 HEADING_SCALE = radians(DEFAULTS.heading_scale_deg)
 ROLL_SCALE = radians(DEFAULTS.roll_scale_deg)
+
+
+def heel_excess(motion: Motion, weights: Weights) -> float:
+    """How far the heel is beyond its limit, in parts of it; 0 within."""
+    limit = radians(weights.heel_limit_deg)
+    return max(fabs(motion.phi) / limit - 1.0, 0.0)
 
 
 class SteeringReward(NamedTuple):

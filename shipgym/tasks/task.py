@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from shipgym.checks import check_choice, check_keys, check_number, check_whole
+from shipgym.engine.lane_records import CONSTRAINT
 from shipgym.engine.motion import Ship
 from shipgym.errors import InputError
 from shipgym.instruments.sensor_set import SensorSet, read_sensors, shipped_sensors
@@ -31,6 +32,7 @@ ENV_OPTIONS = (
     "action_repeat",
     "rate_limit",
     "frame_stack",
+    "constraint_cost",
 )
 VECTOR_OPTIONS = (
     "num_envs",
@@ -372,7 +374,15 @@ class Task:
     def info_names(self) -> tuple[str, ...]:
         """Names of the numbers in `info`."""
         engine = ("envelope_distance", "extrapolating", "cost")
-        return (*self.definition.reported, *engine, *self.reward_parts)
+        constraints = [f"{CONSTRAINT}{name}" for name in self.constraints]
+        reported = self.definition.reported
+        return (*reported, *engine, *self.reward_parts, *constraints)
+
+    @property
+    def constraints(self) -> tuple[str, ...]:
+        """Names of its constraints; `heel` is one where roll is observed."""
+        names = self.definition.constraints
+        return tuple(name for name in names if self.roll or name != "heel")
 
     @cached_property
     def flags(self) -> frozenset[str]:

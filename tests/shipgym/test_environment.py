@@ -7,7 +7,9 @@ from functools import partial
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.wrappers import TimeAwareObservation
+from gymnasium.wrappers import RecordEpisodeStatistics, TimeAwareObservation
+from gymnasium.wrappers.vector import RecordEpisodeStatistics as VectorStatistics
+from stable_baselines3.common.monitor import Monitor
 
 from shipgym import InputError, load_model
 from shipgym.envs.engine import Engine, episode_keys
@@ -44,7 +46,7 @@ def sailed(env, steps=30, swing=0.5):
         shown[-1] += [
             np.copy(infos[name])
             for name in sorted(infos)
-            if not name.startswith(("_", "final"))
+            if not name.startswith(("_", "final", "constraints"))
         ]
         if np.ndim(terminated) == 0 and (terminated or truncated):
             env.reset()
@@ -116,6 +118,66 @@ def test_an_unknown_keyword_is_a_type_error_too():
     for make in (one, many):
         with pytest.raises(TypeError, match="unexpected keyword argument 'frameskip'"):
             make(frameskip=1)
+
+
+@pytest.mark.parametrize("record", [lambda env: env, RecordEpisodeStatistics, Monitor])
+def test_the_end_of_an_episode_tells_its_cost_and_success(record):
+    env = record(one(episode_steps=20))
+    env.reset(seed=3)
+    costs, over = [], False
+    while not over:
+        *_, terminated, truncated, info = env.step(np.zeros(1, dtype=np.float32))
+        over = terminated or truncated
+        costs.append(info["cost"])
+        assert over == ("is_success" in info)
+    assert info["episode"]["cost"] == info["episode_cost"] == pytest.approx(sum(costs))
+    assert info["is_success"] is False
+    assert info["episode"].get("l", 20) == 20
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+def test_rows_tell_their_cost_at_the_end(mode):
+    env = VectorStatistics(many(COURSE, episode_steps=20, autoreset_mode=mode))
+    env.reset(seed=3)
+    for _ in range(20):
+        *_, infos = env.step(np.zeros((3, 1), dtype=np.float32))
+    last = infos.get("final_info", infos)
+    single = one(COURSE, episode_steps=20)
+    single.reset(seed=4)
+    for _ in range(20):
+        *_, info = single.step(np.zeros(1, dtype=np.float32))
+    assert infos["episode"]["cost"][1] == info["episode"]["cost"]
+    assert last["is_success"].tolist() == [True, True, True]
+    assert infos["episode"]["l"].tolist() == [20, 20, 20]
+
+
+def test_constraints_stand_apart_from_the_cost():
+    narrow = {"corridor": 0.3, "ground": 50.0, "heel_limit_deg": 1.0, "roll": True}
+    env = one(model="container", **narrow)
+    safe = one(model="container", constraint_cost=True, action_repeat=2, **narrow)
+    for each in (env, safe):
+        each.reset(seed=1)
+    hard = np.ones(1, dtype=np.float32)
+    sums = {"corridor": 0.0, "heel": 0.0}
+    for _ in range(60):
+        for _ in range(2):
+            *_, info = env.step(hard)
+            for name, excess in info["constraints"].items():
+                sums[name] += excess
+        *_, other = safe.step(hard)
+    state, length = (
+        env.unwrapped.physical_state(),
+        env.unwrapped.model.particulars["length"],
+    )
+    heel = np.degrees(abs(state["phi"]))
+    off = abs(info["cross_track"]) / (0.3 * length)
+    assert info["constraints"]["heel"] == pytest.approx(max(heel - 1.0, 0.0))
+    assert info["constraints"]["corridor"] == pytest.approx(max(off - 1.0, 0.0))
+    assert min(sums.values()) > 0.0
+    assert other["cost"] == pytest.approx(sum(other["constraints"].values()))
+    assert other["objective"] > info["cost"]
+    with pytest.raises(InputError, match="constraint_cost: expected a task with const"):
+        one(COURSE, constraint_cost=True)
 
 
 def three_ships():
