@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import by_name
-from identification.models.hull_formulas import YOSHIMURA
 from identification.models.least_squares import Linearised
 from identification.models.mmg_prior import MMGPrior, mmg_prior
 from identification.models.prior_knowledge import PriorKnowledge
@@ -24,6 +23,7 @@ from identification.models.sailed import (
 from identification.models.segments import compared_channels, cut
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Flags, Floats, Integers
+from shipgym.ships.hull_formulas import YOSHIMURA
 from shipgym.ships.mmg import IDENTIFIED
 
 

@@ -5,16 +5,10 @@ Those of a reference ship, or from main dimensions.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
-from identification.models.hull_formulas import (
-    YOSHIMURA,
-    formula_coefficients,
-    main_dimensions,
-)
 from identification.models.similarity import (
     AUTO,
     LEAST_SIMILARITY,
@@ -27,8 +21,14 @@ from shipgym import InputError, Particulars, ShipModel, load_model
 from shipgym.arrays import Floats
 from shipgym.checks import quoted
 from shipgym.models.catalogue import REFERENCE_SHIPS
-from shipgym.ships.mmg import IDENTIFIED, dimensions, standard_form
-from shipgym.ships.particulars import ADDED_MASSES
+from shipgym.ships.hull_formulas import (
+    YOSHIMURA,
+    completed,
+    formula_coefficients,
+    main_dimensions,
+    self_propulsion,
+)
+from shipgym.ships.mmg import IDENTIFIED, standard_form
 from shipgym.ships.structures import MMG
 
 #: Standard deviations of the coefficients before any trial, about a reference ship and
@@ -109,41 +109,8 @@ def mmg_prior(source: str | ShipModel, particulars: Particulars) -> MMGPrior:
 
     given = _given_added_mass(particulars)
     prior.mean.update(given)
-    prior.mean["nD_U0"] = _self_propulsion(prior.mean, ship)
+    prior.mean["nD_U0"] = self_propulsion(prior.mean, ship)
     return prior
-
-
-def completed(particulars: Particulars) -> Particulars:
-    """Particulars with rudder and propeller of usual size where absent.
-
-    These are marked as estimated. Added masses are coefficients of the MMG form and
-    stand there alone. The rudder's area is that of Det Norske Veritas, L T / 100 (1 +
-    25 (B / L)^2).
-    """
-    ship = particulars.completed()
-    no_added_masses: dict[str, Any] = dict.fromkeys(ADDED_MASSES)
-    given = ship.estimated - no_added_masses.keys()
-    ship = replace(ship, **no_added_masses, estimated=given)
-
-    L = ship.length
-    B = ship.require("beam")
-    T = ship.require("draught")
-    usual_area = L * T / 100.0 * (1.0 + 25.0 * (B / L) ** 2)
-    area = ship.rudder_area or usual_area
-    span = 0.76 * T
-    rudders = ship.rudders or 1.0
-    usual = {
-        "rudder_area": area,
-        "propeller_diameter": 0.6 * T,
-        "rudder_aspect_ratio": span**2 * rudders / area,
-    }
-
-    absent = dict[str, Any]()
-    for name, value in usual.items():
-        if ship[name] is None:
-            absent[name] = value
-    estimated = ship.estimated | absent.keys()
-    return replace(ship, **absent, estimated=estimated)
 
 
 def _formula_prior(ship: Particulars) -> MMGPrior:
@@ -244,30 +211,6 @@ def _given_added_mass(p: Particulars) -> dict[str, float]:
         draught = p.require("draught")
         given[symbol] = -derivative * p.length / draught
     return given
-
-
-def _self_propulsion(c: Mapping[str, float], ship: Particulars) -> float:
-    """Speed n D_P / U0 at which thrust balances resistance at service speed.
-
-    With x = n D_P / U0 and J = (1 - w) / x, thrust is that of K_T = k_0 + k_1 J + k_2
-    J^2 times x^2, so the balance is a quadratic in x.
-    """
-    hull = dimensions(ship)
-    propellers = hull["propellers"]
-    D_P = hull["D_P"]
-    L = ship.length
-    d = ship.require("draught")
-    slip = 1.0 - c["w_P0"]
-
-    # both by rho U0^2 D_P^2
-    thrust = (1.0 - c["t_P"]) * propellers * D_P**2 * c["thrust"]
-    resistance = c["R_0"] * 0.5 * L * d
-    balance = resistance / thrust
-
-    # k_0 x^2 + k_1 (1 - w) x + k_2 (1 - w)^2 = balance
-    half_slope = 0.5 * c["k_1"] * slip / c["k_0"]
-    constant = (c["k_2"] * slip**2 - balance) / c["k_0"]
-    return -half_slope + math.sqrt(half_slope**2 - constant)
 
 
 def _out_of_range(ship: Particulars) -> tuple[str, ...]:

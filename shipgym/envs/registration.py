@@ -51,6 +51,18 @@ ENVIRONMENTS: dict[str, dict[str, Any]] = {
         "speed_weight": 1.0,
         "bounded": 2.0,
     },
+    "shipgym/UnknownShip-v0": {
+        "task": "CourseKeeping",
+        "model": "kvlcc2-mmg",
+        "family": 48,
+        "dt": 4.0,
+        "least_change_deg": 5.0,
+        "course_change_deg": 60.0,
+        "change_interval_steps": 100,
+        "max_heading_error_deg": 120.0,
+        "cost_lengths": 0.25,
+        "bounded": 1.0,
+    },
     "shipgym/PathFollowing-v0": {
         "task": "PathFollowing",
         "model": "container-abc-lssvr",

@@ -1,5 +1,7 @@
 """Current, wind and waves as they act on one ship: numbers of `SeaParameters`."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from shipgym.arrays import Floats
@@ -48,6 +50,7 @@ CALM = SeaParameters(
 )
 
 
+@lru_cache(maxsize=256)
 def weather_column(
     model: ManoeuvringModel, weather: Weather, step: float, water_depth: float = np.inf
 ) -> Floats:

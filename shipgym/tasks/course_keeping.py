@@ -6,10 +6,10 @@ rate (weight 0.01), all in units of 30 degrees, the rate per ship length sailed 
 the largest heading error, so that ending early is never an advantage.
 """
 
-from math import fabs, floor, radians
+from math import copysign, fabs, floor, radians
 from typing import Annotated, NamedTuple
 
-from shipgym.engine.mathematics import wrap
+from shipgym.engine.mathematics import pick, wrap
 from shipgym.engine.motion import Motion, Ship
 from shipgym.tasks.contract import (
     NO_NUMBERS,
@@ -75,6 +75,22 @@ class Settings(NamedTuple):
     ] = 180.0
     speed_weight: Annotated[
         float, Setting("Cost of a step without way.", at_least=0.0)
+    ] = 0.0
+    least_change_deg: Annotated[
+        float,
+        Setting(
+            "Smallest change of the set-point that is drawn, degrees.",
+            at_least=0.0,
+            at_most=90.0,
+        ),
+    ] = 0.0
+    cost_lengths: Annotated[
+        float,
+        Setting(
+            "Ship lengths, sailed at her own speed, that a cost is counted for, so that"
+            " slow and fast ships weigh the same; 0: for each control interval.",
+            at_least=0.0,
+        ),
     ] = 0.0
     weights: Weights = Weights()
     course_changes_deg: Annotated[
@@ -154,6 +170,9 @@ def changed(state: State, steps: float, settings: Settings, random: Random) -> S
     else:
         largest = radians(settings.course_change_deg)
         change = drawn(random, 1 + 2 * number, -largest, largest)
+        least = min(radians(settings.least_change_deg), largest)
+        if least > 0.0:
+            change += copysign(least * (1.0 - fabs(change) / largest), change)
         part = drawn(random, 2 + 2 * number, 0.5, 1.5)
         wait = floor(settings.change_interval_steps * part)
     return State(
@@ -203,10 +222,15 @@ def step(
     integral = integrated(state.integral, error, interval, ship, weights)
     scaled = error * (1.0 / radians(weights.heading_scale_deg))
     way_lost = 1.0 - motion.u * (1.0 / ship.scale_speed)
-    reward = Reward(
-        heading=-scaled * scaled,
-        speed=-settings.speed_weight * max(way_lost, 0.0),
-        steering=steering_reward(motion, interval, ship, weights),
+    reward = in_own_time(
+        Reward(
+            heading=-scaled * scaled,
+            speed=-settings.speed_weight * max(way_lost, 0.0),
+            steering=steering_reward(motion, interval, ship, weights),
+        ),
+        interval,
+        ship,
+        settings,
     )
     after = State(
         heading_setpoint=state.heading_setpoint,
@@ -218,6 +242,27 @@ def step(
     )
     lost = fabs(error) > radians(settings.max_heading_error_deg)
     return after, reward, lost, False
+
+
+def in_own_time(
+    reward: Reward, interval: Interval, ship: Ship, settings: Settings
+) -> Reward:
+    """Reward by the lengths that a ship sails in an interval, if that is asked for."""
+    is_asked = settings.cost_lengths > 0.0
+    lengths = interval.dt * ship.speed / ship.length
+    part = pick(is_asked, lengths / max(settings.cost_lengths, 1e-9), 1.0)
+    slower = pick(is_asked, ship.scale_speed / ship.speed, 1.0)
+    steering = reward.steering
+    return Reward(
+        heading=part * reward.heading,
+        speed=part * reward.speed,
+        steering=SteeringReward(
+            rudder=part * steering.rudder,
+            rudder_rate=part * slower * slower * steering.rudder_rate,
+            roll=part * steering.roll,
+            envelope=part * steering.envelope,
+        ),
+    )
 
 
 def worst_cost(settings: Settings) -> float:

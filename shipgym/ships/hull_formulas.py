@@ -15,10 +15,12 @@ rho L^2 d / 2, the moment of inertia by rho L^4 d / 2.
 """
 
 import math
-from typing import NamedTuple
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
 
-from shipgym import Particulars
-from shipgym.ships.mmg import SHIP
+from shipgym.ships.mmg import SHIP, dimensions
+from shipgym.ships.particulars import ADDED_MASSES, Particulars
 
 YOSHIMURA = "yoshimura"
 
@@ -42,10 +44,43 @@ def main_dimensions(ship: Particulars) -> MainDimensions:
     )
 
 
+def completed(particulars: Particulars) -> Particulars:
+    """Particulars with rudder and propeller of usual size where absent.
+
+    These are marked as estimated. Added masses are coefficients of the MMG form and
+    stand there alone. The rudder's area is that of Det Norske Veritas, L T / 100 (1 +
+    25 (B / L)^2).
+    """
+    ship = particulars.completed()
+    no_added_masses: dict[str, Any] = dict.fromkeys(ADDED_MASSES)
+    given = ship.estimated - no_added_masses.keys()
+    ship = replace(ship, **no_added_masses, estimated=given)
+
+    L = ship.length
+    B = ship.require("beam")
+    T = ship.require("draught")
+    usual_area = L * T / 100.0 * (1.0 + 25.0 * (B / L) ** 2)
+    area = ship.rudder_area or usual_area
+    span = 0.76 * T
+    rudders = ship.rudders or 1.0
+    usual = {
+        "rudder_area": area,
+        "propeller_diameter": 0.6 * T,
+        "rudder_aspect_ratio": span**2 * rudders / area,
+    }
+
+    absent = dict[str, Any]()
+    for name, value in usual.items():
+        if ship[name] is None:
+            absent[name] = value
+    estimated = ship.estimated | absent.keys()
+    return replace(ship, **absent, estimated=estimated)
+
+
 def formula_coefficients(ship: Particulars) -> dict[str, float]:
     """Coefficients of the MMG form from main dimensions, without the shaft speed.
 
-    `ship`: as `mmg_prior.completed` gives it.
+    `ship`: as `completed` gives it.
     """
     masses = added_mass(ship)
     coefficients = dict.fromkeys(SHIP.coefficients, 0.0)
@@ -172,3 +207,27 @@ def _rudder(ship: Particulars) -> dict[str, float]:
         "f_alpha": 6.13 * aspect / (2.25 + aspect),
         "x_R": -0.5,
     }
+
+
+def self_propulsion(c: Mapping[str, float], ship: Particulars) -> float:
+    """Speed n D_P / U0 at which thrust balances resistance at service speed.
+
+    With x = n D_P / U0 and J = (1 - w) / x, thrust is that of K_T = k_0 + k_1 J + k_2
+    J^2 times x^2, so the balance is a quadratic in x.
+    """
+    hull = dimensions(ship)
+    propellers = hull["propellers"]
+    D_P = hull["D_P"]
+    L = ship.length
+    d = ship.require("draught")
+    slip = 1.0 - c["w_P0"]
+
+    # both by rho U0^2 D_P^2
+    thrust = (1.0 - c["t_P"]) * propellers * D_P**2 * c["thrust"]
+    resistance = c["R_0"] * 0.5 * L * d
+    balance = resistance / thrust
+
+    # k_0 x^2 + k_1 (1 - w) x + k_2 (1 - w)^2 = balance
+    half_slope = 0.5 * c["k_1"] * slip / c["k_0"]
+    constant = (c["k_2"] * slip**2 - balance) / c["k_0"]
+    return -half_slope + math.sqrt(half_slope**2 - constant)
