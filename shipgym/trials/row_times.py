@@ -1,6 +1,7 @@
 """Times of the rows of a table: numbers in their unit, clock times, repeated ones."""
 
 import re
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ _EPOCHS = {
     "gps tow": 315_964_782.0,
     "gps tow ms": 315_964_782.0,
 }
+_STAMP = re.compile(r"\d{9,10}\.\d{1,9}")
 _COMPACT = re.compile(
     r"(?P<date>(?:19|20)\d\d[01]\d[0-3]\d)?(?P<time>[0-2]\d[0-5]\d[0-5]\d(?:\.\d+)?)"
 )
@@ -61,6 +63,12 @@ def read_times(table: LogTable, column: Column) -> RowTimes:
             cells[row] = moment.strip()
 
     notes: list[str] = []
+    if _are_unpadded(cells):
+        cells = [_padded(cell) for cell in cells]
+        table = replace(table, cells={**table.cells, column.name: cells})
+        notes.append(
+            f"the digits behind the point of column '{column.name}' count nanoseconds"
+        )
     first = next(filter(None, cells), "0")
     is_numeric = is_number(first.replace(",", "."))
     if _are_compact(cells):
@@ -88,6 +96,25 @@ def read_times(table: LogTable, column: Column) -> RowTimes:
     zero = float(known[0]) if known.size else 0.0
     ahead = zone_seconds(column.zone, str(table.path))
     return RowTimes(clock - zero, unit="s", start=zero - ahead, notes=notes)
+
+
+def _are_unpadded(cells: list[str]) -> bool:
+    """Return whether fractions of seconds are counts of nanoseconds, without zeros.
+
+    As ROS joins seconds and nanoseconds: then alone the times increase.
+    """
+    stamps = [cell for cell in cells if _STAMP.fullmatch(cell)]
+    if len(stamps) < 3 or len(stamps) < len(cells):
+        return False
+    as_written = np.diff([float(cell) for cell in stamps])
+    as_counts = np.diff([float(_padded(cell)) for cell in stamps])
+    return bool(np.any(as_written <= 0.0) and np.all(as_counts > 0.0))
+
+
+def _padded(stamp: str) -> str:
+    """A time whose fraction has nine digits."""
+    whole, _, count = stamp.partition(".")
+    return f"{whole}.{count:0>9}"
 
 
 def _are_compact(cells: list[str]) -> bool:

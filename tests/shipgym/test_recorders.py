@@ -210,6 +210,17 @@ def test_units_that_a_name_or_recorder_defines_are_known(tmp_path):
     assert units == {"t": "ms", "psi": "rad", "r": "rad/s", "delta_command": "rad"}
 
 
+def test_nanoseconds_without_their_zeros_are_counts(tmp_path):
+    stamps = [
+        f"{1700000000 + k // 10}.{k % 10 * 100_000_000 + 5_000}" for k in range(240)
+    ]
+    columns = plain()
+    names = ["header.stamp", "Heading", "Rudder"]
+    text = table(names, stamps, columns["Heading"], columns["Rudder"])
+    trial = guessed(tmp_path, text).trial
+    assert np.diff(trial.t) == pytest.approx(0.1, abs=1e-6)
+
+
 def test_files_of_one_log_are_read_together(tmp_path):
     columns = plain()
     part = table(["t", "Heading"], T, columns["Heading"])

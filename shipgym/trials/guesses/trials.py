@@ -178,7 +178,12 @@ def _guess_tables(
     for table in by_density:
         found = {guess.channel: guess for guess in guess_columns(table)}
         decisions += _unknown_units(found)
-        columns = settle_speeds(table, found) | columns
+        settled = settle_speeds(table, found)
+        for channel, guess in settled.items():
+            reason = guess.reason
+            if len(tables) > 1 and channel != "t":
+                reason += f"; from {table.path.name}"
+            columns.setdefault(channel, guess._replace(reason=reason))
     asked = {one.key for one in decisions}
     decisions += _missing_columns(tables, columns, asked)
     return columns, decisions

@@ -57,7 +57,8 @@ def read_csv(path: Path, content: bytes) -> LogTable:
     notes += title_note(header_at, len(titles))
     unit_rows = [split(lines[number], delimiter) for number in layout.units]
     body = _find_rows(path, lines, layout, len(header))
-    columns = _columns(list(body.lines.values()), delimiter, len(header))
+    as_texts = [k for k, name in enumerate(header) if "stamp" in name.lower()]
+    columns = _columns(list(body.lines.values()), delimiter, len(header), as_texts)
     notes += _drop_stuck_doubles(header, columns)
     _check_header(path, header, header_at)
     return LogTable(
@@ -134,8 +135,13 @@ def _settle_lacking(
     )
 
 
-def _columns(rows: list[str], delimiter: str, n_cells: int) -> list[Any]:
-    """Columns of rows: numbers where all cells are plain ones, else texts."""
+def _columns(
+    rows: list[str], delimiter: str, n_cells: int, as_texts: Sequence[int]
+) -> list[Any]:
+    """Columns of rows: numbers where all cells are plain ones, else texts.
+
+    Those of `as_texts` with a point stay texts: the digits behind it may be a count.
+    """
     import pandas as pd
 
     if not rows:
@@ -155,6 +161,7 @@ def _columns(rows: list[str], delimiter: str, n_cells: int) -> list[Any]:
         keep_default_na=False,
         na_values=[""],
         low_memory=False,
+        dtype={k: str for k in as_texts if "." in split(rows[0], delimiter)[k]},
     )
     columns: list[Any] = []
     for _, column in frame.items():
