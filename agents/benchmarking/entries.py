@@ -6,6 +6,7 @@ A controller is named, on the command line and in Python, as
     tuned-pid             the same with the settings of direct search for the task
     tuned-best            of these, the one with the lowest cost in each task
     ppo                   the shipped agent of the environment (agents/pretrained)
+    rule                  the rule in the file of the task (shipgym.tasks.contract)
     runs/agent.json       a file of an agent or controller
     runs/{task}-*.json    one file for each task; several that match are training runs
     my_module:factory     a function that returns a controller for a `BenchmarkTask`,
@@ -33,6 +34,7 @@ from agents.controllers.registry import (
     controller_kinds,
     register_controller,
 )
+from agents.controllers.task_rule import TaskRule
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
@@ -40,6 +42,7 @@ from shipgym.files import LARGEST_TENSORS, read_bytes
 from shipgym.python_files import working_folder
 
 SHIPPED = "ppo"  # agents of agents/pretrained, one for each environment
+RULE = "rule"  # of the task's own file
 TUNED = "tuned-"
 
 
@@ -102,7 +105,7 @@ class Entry:
 def known_names() -> tuple[str, ...]:
     """Names that stand for a controller, other than files and functions."""
     tuned_names = [TUNED + kind for kind in ("best", *CLASSICAL)]
-    return (*controller_kinds(), SHIPPED, *tuned_names)
+    return (*controller_kinds(), SHIPPED, RULE, *tuned_names)
 
 
 def names_code(text: str) -> bool:
@@ -263,6 +266,8 @@ def _policies(source: Any, task: BenchmarkTask) -> list[Policy]:
         return [_policy(run, task) for run in runs]
     if names_code(source):
         return [_policy(_imported(source), task)]
+    if source == RULE:
+        return [TaskRule(task.task, task.ship)]
     if source in controller_kinds():
         return [_designed(source, task)]
     if source.startswith(TUNED):

@@ -174,10 +174,7 @@ def _print_evaluation(now: TrainingProgress) -> None:
 
 
 def _costs(now: TrainingProgress) -> str:
-    """Costs of a training so far, with LQ's."""
-    if now.cost is None:
-        return ""
-    costs = f"cost {now.cost:.2f}, best {now.best_cost:.2f}"
-    if now.lq_cost is not None:
-        costs += f", LQ {now.lq_cost:.2f}"
-    return costs
+    """Costs of a training so far, with that of the best yardstick."""
+    name = min(now.yardsticks, key=lambda one: now.yardsticks[one])
+    best = now.yardsticks[name]
+    return f"cost {now.cost:.6g}, best {now.best_cost:.6g}, {name} {best:.6g}"

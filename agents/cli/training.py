@@ -24,6 +24,7 @@ from agents.cli.parameters import with_options
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from agents.controllers.interface import Policy
     from agents.training.evaluation import TrainingResult
     from agents.training.plan import TrainingPlan
     from agents.training.tuning import TuningResult, TuningTrial
@@ -142,10 +143,21 @@ def train_command(
     resume: Annotated[
         bool, Option("--resume", help="Continue the run in the folder.")
     ] = False,
+    compare: Annotated[
+        str | None,
+        Option(
+            metavar="CONTROLLERS",
+            help=(
+                "Yardsticks beside no action, random ones, the rule of the task and LQ:"
+                " rule, or as `benchmark --controllers` takes them."
+            ),
+        ),
+    ] = None,
 ) -> None:
     """Train an autopilot by reinforcement learning.
 
-    Writes policy, learning curve and checkpoints.
+    Writes policy, learning curve and checkpoints. Prints what an episode cost before
+    and after, and what it costs with other controllers.
 
     A run killed at any moment resumes with --resume from its last save, about a minute
     old at most. With --resume, options that are not given keep their values; others
@@ -154,7 +166,8 @@ def train_command(
     more = {"seed": seed, "threads": threads}
     fields |= {name: value for name, value in more.items() if value is not None}
     plan = _checked_plan(fields, out, resume)
-    _print_result(_train(plan, out, resume), out)
+    compared = _compared(plan, compare)
+    _print_result(_train(plan, out, resume, compared), out)
 
 
 def _named(texts: list[str] | None, option: str) -> dict[str, Any]:
@@ -178,17 +191,29 @@ def _checked_plan(fields: dict[str, Any], out: Path, resume: bool) -> TrainingPl
         plan = make_plan(TrainingRequest(**fields))
 
     steps = fields["settings"].get("total_steps", 0)
-    rollout = plan.settings.rollout
-    if steps % rollout:
-        rounded = -(-steps // rollout) * rollout
+    if steps % plan.settings.rollout:
         warn(
-            f"total_steps: {steps:,} is rounded up to {rounded:,}: a rollout of all"
-            f" ships has {rollout:,} steps"
+            f"total_steps: {steps:,} is rounded up to {plan.settings.all_decisions:,}:"
+            f" a rollout of all ships has {plan.settings.rollout:,} steps"
         )
     return plan
 
 
-def _train(plan: TrainingPlan, out: Path, resume: bool) -> TrainingResult:
+def _compared(plan: TrainingPlan, names: str | None) -> dict[str, Policy]:
+    """Further yardsticks by name, before anything is trained."""
+    if names is None:
+        return {}
+    from agents.benchmarking.entries import read_entries
+
+    policies = {}
+    for entry in read_entries(names):
+        policies[entry.name], *_ = entry.policies(plan.task)
+    return policies
+
+
+def _train(
+    plan: TrainingPlan, out: Path, resume: bool, compared: Mapping[str, Policy]
+) -> TrainingResult:
     from agents.cli.terminal import training_bar
     from agents.training.run_folder import CHECKPOINT
     from agents.training.training import train
@@ -200,6 +225,7 @@ def _train(plan: TrainingPlan, out: Path, resume: bool) -> TrainingResult:
                 out,
                 resume=resume,
                 on_progress=on_progress,
+                compared=compared,
                 command=shlex.join(["shipgym", *sys.argv[1:]]),
             )
     except KeyboardInterrupt:
@@ -210,17 +236,20 @@ def _train(plan: TrainingPlan, out: Path, resume: bool) -> TrainingResult:
 
 
 def _print_result(result: TrainingResult, out: Path) -> None:
-    """Print costs, and where the agent was written."""
-    from agents.cli.terminal import answer, say
+    """Print costs beside those of yardsticks, and where the agent was written."""
+    from agents.cli.tables import plain_table
+    from agents.cli.terminal import answer, console, say
 
     agent = out / "agent.json"
     answer({**result.to_dict(), "agent": str(agent)})
     if result.resumed_from is not None:
         say(f"resumed at step {result.resumed_from:,}")
-    costs = f"cost of a held-out episode: {result.best_cost:.2f}"
-    if result.lq_cost is not None:
-        costs += f"; LQ's: {result.lq_cost:.2f}"
-    say(f"{costs} (step {result.best_steps:,} of {result.steps:,})")
+    table = plain_table("Mean cost of an episode held out", "", ">cost")
+    best = f"trained: best policy, step {result.best_steps:,} of {result.steps:,}"
+    costs = {"before training": result.first_cost, best: result.best_cost}
+    for name, cost in {**costs, **result.yardsticks}.items():
+        table.add_row(name, f"{cost:.6g}")
+    console.print(table)
     reached = result.lq_reached
     if reached is not None:
         steps = reached["steps"]

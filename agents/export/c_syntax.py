@@ -87,12 +87,13 @@ def literal(value: float) -> str:
     return f"({text})" if text.startswith("-") else text
 
 
-def comment(text: str, longest: int = 120) -> str:
+def comment(text: str) -> str:
     """A text as a comment of C may hold it, in the writer's own letters.
 
     A space parts what would end or begin a comment or stand for another character;
-    characters that nobody sees are named.
+    characters that nobody sees are named, and a long text is cut.
     """
+    longest = 120
     shown = "".join([_seen(character) for character in text])
     if len(shown) > longest:
         shown = f"{shown[:longest]}..."

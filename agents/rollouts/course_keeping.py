@@ -143,9 +143,6 @@ def step_response(
     models: ShipModel | Sequence[ShipModel],
     step_deg: float = 20.0,
     duration: float | None = None,
-    task: Task | None = None,
-    *,
-    allow_unstable: bool = False,
 ) -> StepResponses:
     """Turn ships from straight ahead to a new course, all at once.
 
@@ -155,8 +152,8 @@ def step_response(
     ----------
     controller : Policy
         Anything with `predict`.
-    models, task, allow_unstable
-        As in `sail`; of the task its control interval and bounds are used.
+    models
+        As in `sail`.
     step_deg : float
         Change of course, degrees, positive to starboard.
     duration : float, optional
@@ -176,12 +173,12 @@ def step_response(
     if duration is None:
         duration = step_lengths * first.travel_time
     check_number(duration, "duration", above=0.0)
-    asked = task or course_keeping_task()
+    asked = course_keeping_task()
     check_fits(controller, asked, first, f"model '{first.name}'")
 
     steps = int(np.ceil(duration / asked.interval(first)))
     straight = asked.changed(course_change_deg=0.0, episode_steps=steps)
-    engine = Engine(ships, len(ships), straight, allow_unstable=allow_unstable)
+    engine = Engine(ships, len(ships), straight)
     step = float(np.radians(step_deg))
     run = rollout(
         controller,

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from agents.controllers.interface import Policy
 from agents.rollouts.rollout import Rollout, rollout
 from agents.suites.suite import BenchmarkTask
-from shipgym import ShipModel
 from shipgym.arrays import Flags, Floats
 from shipgym.python_files import asked
 from shipgym.tasks.task import Task
@@ -144,12 +143,11 @@ def steering(run: Rollout) -> dict[str, Floats]:
     }
 
 
-def reversals(angle: Floats, counts: Flags, dead_band: float = DEAD_BAND) -> Floats:
-    """Count how often an angle turns round by more than a dead band.
+def reversals(angle: Floats, counts: Flags) -> Floats:
+    """Count how often an angle turns round and comes back by more than 0.5 degrees.
 
     `angle`: rad, shape (n_steps + 1, n); `counts`: intervals that count, the first ones
-    of each, shape (n_steps, n); `dead_band`: rad; a smaller return does not count.
-    Returns shape (n,).
+    of each, shape (n_steps, n). Returns shape (n,).
     """
     lowest = angle[0]  # since the last turn
     highest = angle[0]
@@ -157,8 +155,8 @@ def reversals(angle: Floats, counts: Flags, dead_band: float = DEAD_BAND) -> Flo
     number: Floats = np.zeros_like(lowest)
 
     for now, counted in zip(angle[1:], counts, strict=True):
-        is_up = now > lowest + dead_band
-        is_down = now < highest - dead_band
+        is_up = now > lowest + DEAD_BAND
+        is_down = now < highest - DEAD_BAND
         rises = is_up & (direction <= 0.0)
         falls = is_down & (direction >= 0.0)
         turns = rises | falls
@@ -296,23 +294,20 @@ class Evaluation(NamedTuple):
 
 
 def evaluate(
-    policy: Policy,
-    task: BenchmarkTask,
-    seeds: ArrayLike | None = None,
-    model: ShipModel | None = None,
+    policy: Policy, task: BenchmarkTask, seeds: ArrayLike | None = None
 ) -> Evaluation:
     """Sail the episodes of a task, all at once, whatever the policy does.
 
     See `rollout`, tolerant. `policy`: anything with `predict`; it is given the
     observations of all ships together; `task`: of a suite; `seeds`: by default those
-    that are scored, shape (n,); `model`: another ship than the task's own.
+    that are scored, shape (n,).
     """
     if seeds is None:
         seeds = task.seeds
     numbers = np.asarray(seeds, dtype=np.int64)
     run = rollout(
         policy,
-        task.engine(len(numbers), model),
+        task.engine(len(numbers)),
         numbers,
         record=recorded_for_metrics(task.task),
         tolerant=True,

@@ -1,39 +1,38 @@
 """Evaluation of a policy that learns: episodes held out, progress and result."""
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from agents.controllers.designs import design
-from agents.controllers.interface import Policy, check_fits
+from agents.controllers.interface import Policy
 from agents.policies.policy import LearnedPolicy
 from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask
 from agents.training.plan import TrainingPlan
-from shipgym.errors import InputError
+from agents.training.yardsticks import yardsticks
 
 
 class HeldOut:
     """Episodes of a task that are not learned from, with seeds from `first` on.
 
-    `lq_cost` is the mean cost of LQ designed on the task's ship, which follows paths by
-    the course that the task shows; None where there is none for her.
+    `costs` has the mean cost of each yardstick by its name. Among them is LQ designed
+    on the task's ship, which follows paths by the course that the task shows.
     """
 
     def __init__(
-        self, task: BenchmarkTask, first: int, number: int, threads: int = 1
+        self,
+        task: BenchmarkTask,
+        first: int,
+        number: int,
+        threads: int = 1,
+        compared: Mapping[str, Policy] | None = None,
     ) -> None:
         self.engine = task.engine(number, threads=threads)
         self.seeds = first + np.arange(number)
-        self.lq_cost: float | None = None
-        if task.task.action == "rudder":
-            with suppress(InputError):
-                lq = design("lq", task)
-                check_fits(lq, task.task, task.ship, "lq")
-                self.lq_cost = self.cost(lq)
+        policies = {**yardsticks(task), **(compared or {})}
+        self.costs = {name: self.cost(one) for name, one in policies.items()}
 
     def cost(self, policy: Policy) -> float:
         """Mean cost of a policy."""
@@ -43,15 +42,14 @@ class HeldOut:
 class TrainingProgress(NamedTuple):
     """Progress of a training."""
 
-    #: decisions learned from, and to learn from
+    #: decisions learned from, and to learn from, in whole rollouts
     steps: int
     total: int
     seconds: float  # spent so far, also before it was resumed
-    #: mean cost of the episodes held out, at the last evaluation, at the best one, and
-    #: of LQ
-    cost: float | None
-    best_cost: float | None
-    lq_cost: float | None
+    #: mean cost of the episodes held out, at the last evaluation and at the best one
+    cost: float
+    best_cost: float
+    yardsticks: Mapping[str, float]  # the same cost, by name
     evaluated: bool = False  # there is a new evaluation
 
 
@@ -69,9 +67,19 @@ class TrainingResult:
     #: when the policy was found, and when the training ended
     best_steps: int
     steps: int
-    lq_cost: float | None  # of LQ on the same episodes
+    yardsticks: Mapping[str, float]  # mean costs on the same episodes, by name
     seconds: float  # of training and evaluation, also before it was resumed
     resumed_from: int | None  # steps of the checkpoint that it went on from
+
+    @property
+    def first_cost(self) -> float:
+        """Mean cost of the policy that has learned nothing yet."""
+        return float(self.curve[0]["cost"])
+
+    @property
+    def lq_cost(self) -> float | None:
+        """Mean cost of LQ on the same episodes, if the ship has one for the task."""
+        return self.yardsticks.get("LQ")
 
     @property
     def lq_reached(self) -> Mapping[str, Any] | None:
@@ -91,8 +99,10 @@ class TrainingResult:
             "steps": self.steps,
             "resumed_from": self.resumed_from,
             "seconds": self.seconds,
+            "first_cost": self.first_cost,
             "best_cost": self.best_cost,
             "best_steps": self.best_steps,
+            "yardsticks": dict(self.yardsticks),
             "lq_cost": self.lq_cost,
             "lq_reached": self.lq_reached,
             "curve": list(self.curve),

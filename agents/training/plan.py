@@ -18,6 +18,7 @@ from agents.training.settings import (
     read_settings_file,
     settings_of,
 )
+from agents.training.yardsticks import half_reward_cost
 from shipgym.checks import (
     check_choice,
     check_keys,
@@ -271,7 +272,8 @@ def _task(request: TrainingRequest) -> BenchmarkTask:
 def training_options(plan: TrainingPlan) -> dict[str, Any]:
     """Keywords of the environment that the ships learn in.
 
-    They earn what the setting `reward` says, unless the task's options do.
+    They earn what the setting `reward` says, unless the task's options do; in a task of
+    a user's file the bounded reward has the scale of its costs (`half_reward_cost`).
     With `randomise`, or the setting `model_uncertainty`, each episode has a ship drawn
     from the model's covariance, where it has one; with `randomise` also an approach
     speed of 0.8 to 1.1 times the service speed, and any of the sea states that the
@@ -279,7 +281,8 @@ def training_options(plan: TrainingPlan) -> dict[str, Any]:
     """
     task = plan.task
     options = task.arguments
-    options.setdefault("bounded", plan.settings.reward == "bounded")
+    if "bounded" not in options:
+        options["bounded"] = _bounded(plan)
     uncertain = plan.settings.model_uncertainty == "covariance"
     has_covariance = task.ship.covariance is not None
     if has_covariance and (plan.request.randomise or uncertain):
@@ -288,6 +291,14 @@ def training_options(plan: TrainingPlan) -> dict[str, Any]:
         options.setdefault("speed_range", (0.8, 1.1))
         options["sea"] = _seas(task.task, task.ship)
     return options
+
+
+def _bounded(plan: TrainingPlan) -> bool | float:
+    """Return what the keyword `bounded` is for the ships that learn."""
+    if plan.settings.reward != "bounded" or plan.task.environment in SHORT_NAMES:
+        return plan.settings.reward == "bounded"
+    seeds = range(plan.training_seed, plan.training_seed + 50)
+    return half_reward_cost(plan.task, seeds)
 
 
 def _seas(task: Task, ship: ShipModel) -> list[Weather]:

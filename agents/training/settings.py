@@ -1,9 +1,9 @@
 """Settings of learning: one frozen dataclass an algorithm, read from TOML.
 
 The files in `hyperparameters/` have the tuned values that differ from the defaults
-here, later tables before earlier ones: `defaults`, to learn from scratch; those with a
-base in an environment (`residual`), on every task of a suite (`suites`), on one of them
-(`tasks`).
+here, later tables before earlier ones: `defaults`, to learn from scratch; `own`, to
+learn a task of a user's file from scratch; those with a base in an environment
+(`residual`), on every task of a suite (`suites`), on one of them (`tasks`).
 """
 
 from abc import abstractmethod
@@ -108,7 +108,8 @@ class LearningSettings(Settings):
     )
     reward: str = setting(
         "what ships earn: minus the steering cost, which reward_scale suits, or the"
-        " bounded reward that environments give by default",
+        " bounded reward that environments give by default; in a task of your own its"
+        " scale follows from what a step costs under random actions",
         "cost",
         options=("cost", "bounded"),
     )
@@ -138,6 +139,11 @@ class LearningSettings(Settings):
     @abstractmethod
     def rollout(self) -> int:
         """Decisions of all ships between two updates; a training has whole rollouts."""
+
+    @property
+    def all_decisions(self) -> int:
+        """Decisions of a training: `total_steps`, rounded up to whole rollouts."""
+        return -(-self.total_steps // self.rollout) * self.rollout
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -349,6 +355,8 @@ def load_settings(
     given = given or {}
     tables = shipped_toml("agents.training", f"hyperparameters/{algorithm}.toml")
     values = dict(tables["defaults"])
+    if environment.endswith(".py") and given.get("base", "none") == "none":
+        values |= tables["own"]
     has_base = action == "rudder" and given.get("base") != "none"
     if has_base:
         values |= tables["residual"].get(environment, {})

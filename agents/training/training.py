@@ -7,7 +7,7 @@ episodes. What is saved is tensors and JSON, which torch reads without running c
 
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from io import BytesIO
@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from agents.agent_file import load_agent
+from agents.controllers.interface import Policy
 from agents.output import in_use
 from agents.policies.policy import LearnedPolicy
 from agents.training import run_folder
@@ -57,6 +58,7 @@ def train(
     resume: bool = False,
     on_progress: Callable[[TrainingProgress], None] | None = None,
     command: str | None = None,
+    compared: Mapping[str, Policy] | None = None,
     evaluation_episodes: int = N_EVALUATIONS,
     save_seconds: float = 45.0,
 ) -> TrainingResult:
@@ -79,6 +81,8 @@ def train(
         training.
     command : str, optional
         Command line that is written into the run's folder.
+    compared : mapping of str to Policy, optional
+        Further yardsticks by name, beside those of `yardsticks`.
     evaluation_episodes : int
         Episodes held out, on which the policy is chosen.
     save_seconds : float
@@ -95,7 +99,10 @@ def train(
             else:
                 run_folder.check_new(folder)
         stack.enter_context(_torch_threads(plan.threads))
-        run = _Run(plan, folder, evaluation_episodes, save_seconds)
+        held_out = HeldOut(
+            plan.task, EVALUATION_SEED, evaluation_episodes, plan.threads, compared
+        )
+        run = _Run(plan, folder, held_out, save_seconds)
         run.on_progress = on_progress
         if folder is not None and resume:
             run.restore(folder / run_folder.CHECKPOINT)
@@ -114,7 +121,7 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
         self,
         plan: TrainingPlan,
         folder: Path | None,
-        evaluation_episodes: int,
+        held_out: HeldOut,
         save_seconds: float,
     ) -> None:
         super().__init__()
@@ -122,9 +129,7 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
         self.plan = plan
         self.folder = folder
         self.save_seconds = save_seconds
-        self.held_out = HeldOut(
-            plan.task, EVALUATION_SEED, evaluation_episodes, plan.threads
-        )
+        self.held_out = held_out
         self.agent = make_agent(plan, design_base(plan.settings.base, plan.task))
         self.policy: LearnedPolicy | None = None
         self.curve: list[dict[str, Any]] = []
@@ -178,7 +183,7 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
             best_cost=self.best["cost"],
             best_steps=self.best["steps"],
             steps=self.steps,
-            lq_cost=self.held_out.lq_cost,
+            yardsticks=self.held_out.costs,
             seconds=self.seconds,
             resumed_from=self.resumed_from,
         )
@@ -202,11 +207,11 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
     def _progress(self, evaluated: bool) -> TrainingProgress:
         return TrainingProgress(
             steps=self.steps,
-            total=self.plan.settings.total_steps,
+            total=self.plan.settings.all_decisions,
             seconds=self.seconds,
             cost=self.curve[-1]["cost"],
             best_cost=self.best["cost"],
-            lq_cost=self.held_out.lq_cost,
+            yardsticks=self.held_out.costs,
             evaluated=evaluated,
         )
 
@@ -236,7 +241,7 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
             policy.save(self.folder / run_folder.LAST)
             if is_best:
                 policy.save(self.folder / run_folder.AGENT)
-            progress = {"lq_cost": self.held_out.lq_cost, "curve": self.curve}
+            progress = {"yardsticks": self.held_out.costs, "curve": self.curve}
             write_json(progress, self.folder / run_folder.PROGRESS)
 
     def _diverged(self) -> InputError:
@@ -255,7 +260,7 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
             "evaluation_seeds": [seeds[0], seeds[-1]],
             "steps": self.steps,
             "cost": self.curve[-1]["cost"],
-            "lq_cost": self.held_out.lq_cost,
+            "lq_cost": self.held_out.costs.get("LQ"),
             "curve": [[row["steps"], row["cost"]] for row in self.curve],
             "versions": run_folder.versions(),
         }

@@ -39,6 +39,9 @@ and may define
   another kind, such as a list of waypoints, means as numbers.
 * `current(x, y, settings) -> (north, east)`: a current by place, m/s.
 * `draw(motion, state, ship, settings)`: shapes for pictures (`shipgym.tasks.shapes`).
+* `rule(seen, ship, settings)`: the command that the best rule you know gives for an
+  `Observation` in SI units: the rudder, or (rudder, shaft), as parts of the largest.
+  `shipgym train` compares agents with it. It is plain Python, asked ship by ship.
 
 Other ships are records in `State` that `step` sails (`shipgym.tasks.traffic`).
 

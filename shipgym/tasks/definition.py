@@ -57,6 +57,7 @@ FUNCTIONS = {
     "plan_length": ("settings",),
     "current": ("x", "y", "settings"),
     "draw": ("motion", "state", "ship", "settings"),
+    "rule": ("seen", "ship", "settings"),
     "check": ("settings", "model"),
     "listed": ("value",),
 }
@@ -128,6 +129,8 @@ class TaskDefinition(Configurable):
         Current by place, `current(x, y, settings) -> (north, east)`, m/s.
     draw : callable or None
         Shapes for pictures (`shipgym.tasks.shapes`).
+    rule : callable or None
+        Command by a rule, `rule(seen, ship, settings)`, the yardstick of agents.
     reported : tuple of str
         Fields of the state that `info` has.
     constraints : tuple of str
@@ -156,6 +159,7 @@ class TaskDefinition(Configurable):
     steps_per_length: float = STEPS_PER_LENGTH
     current: Callable[..., Any] | None = None
     draw: Callable[..., Any] | None = None
+    rule: Callable[..., Any] | None = None
 
     @cached_property
     def targets(self) -> tuple[str, ...]:

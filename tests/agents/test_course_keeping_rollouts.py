@@ -137,10 +137,8 @@ def test_a_model_found_unstable_is_steered_only_where_asked():
     marked = replace(MARINER, provenance={"stable": False})
     for call in (sail, step_response):
         with pytest.raises(InputError, match="found unstable when it was identified"):
-            call(PILOT, marked, task=SHORT)
-        with pytest.warns(UserWarning, match="found unstable when it was identified"):
-            asked = call(PILOT, marked, task=SHORT, allow_unstable=True)
-        plain = call(PILOT, MARINER, task=SHORT)
-        np.testing.assert_array_equal(
-            *(found.cost if call is sail else found.heading for found in (asked, plain))
-        )
+            call(PILOT, marked)
+    with pytest.warns(UserWarning, match="found unstable when it was identified"):
+        asked = sail(PILOT, marked, task=SHORT, allow_unstable=True)
+    plain = sail(PILOT, MARINER, task=SHORT)
+    np.testing.assert_array_equal(asked.cost, plain.cost)

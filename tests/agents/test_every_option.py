@@ -79,7 +79,7 @@ LINES = (
         0,
     ),
     ("train ppo --resume --out run", 0),
-    (f"train ppo {TASK} {LEARNING} {SMALL} --out run2", 0),
+    (f"train ppo {TASK} {LEARNING} {SMALL} --compare pid --out run2", 0),
     (
         f"tune ppo {TASK_OF_OWN} {LEARNING} {SMALL} --randomise --trials 1 --seed 1"
         " --engine local --workers 1 --out study",

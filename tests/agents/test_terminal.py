@@ -12,6 +12,7 @@ from agents.cli import tables, terminal
 from identification import progress
 
 NOW = {"total": 20_000, "seconds": 12.4, "cost": 5.0, "best_cost": 4.5}
+NOW["yardsticks"] = {"zero action": 9.0, "LQ": 4.25}
 
 
 @pytest.mark.parametrize("quiet", [False, True])
@@ -20,7 +21,7 @@ def test_bars_are_shown_on_a_terminal_that_is_not_to_be_quiet(quiet, monkeypatch
     printed = StringIO()
     console = Console(file=printed, force_terminal=True, width=110)
     monkeypatch.setattr(terminal, "err", console)
-    now = SimpleNamespace(steps=5000, evaluated=False, lq_cost=None, **NOW)
+    now = SimpleNamespace(steps=5000, evaluated=False, **NOW)
     with terminal.printing(as_json=False, quiet=quiet):
         with terminal.identifying("identifying"):
             list(progress.counted("[models] drawn", "abcd"))
@@ -36,7 +37,7 @@ def test_bars_are_shown_on_a_terminal_that_is_not_to_be_quiet(quiet, monkeypatch
         assert "%" not in last["identifying"]
         assert "100%" in last["[models]"]
         assert "25%" in last["training"]
-        assert last["training"].rstrip().endswith("cost 5.00, best 4.50")
+        assert last["training"].rstrip().endswith("cost 5, best 4.5, LQ 4.25")
 
 
 def test_names_from_files_do_not_steer_the_terminal(capsys):

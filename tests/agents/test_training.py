@@ -119,7 +119,7 @@ def test_the_file_is_the_policy_of_the_lowest_cost_held_out(tmp_path):
     assert agent.training.items() >= plan.configuration().items()
     assert agent.training["cost"] == result.best_cost
     progress = json.loads((run / "progress.json").read_text())
-    assert progress == {"lq_cost": result.lq_cost, "curve": list(result.curve)}
+    assert progress == {"yardsticks": result.yardsticks, "curve": list(result.curve)}
     assert json.loads((run / "run.json").read_text())["command"] == "train('ppo')"
     assert result.curve[0]["mean_return"] is None
     assert all(row["mean_return"] < 0.0 for row in result.curve[1:])

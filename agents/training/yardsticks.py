@@ -1,0 +1,83 @@
+"""What an agent is compared with, and what a step of a task costs without one."""
+
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from agents.controllers.designs import design
+from agents.controllers.interface import Policy, check_fits
+from agents.controllers.task_rule import TaskRule
+from agents.rollouts.rollout import rollout
+from agents.suites.suite import BenchmarkTask
+from shipgym.errors import InputError
+from shipgym.tasks.task import HALF_REWARD_COST
+
+
+class ZeroAction:
+    """Commands nothing: the rudder amidships, the shaft stopped."""
+
+    def __init__(self, n_commands: int) -> None:
+        self.n_commands = n_commands
+
+    def commands(self, n_ships: int) -> Any:
+        """Return the commands of ships, shape (n_ships, n_commands)."""
+        return np.zeros((n_ships, self.n_commands), dtype=np.float32)
+
+    def predict(self, observation: Any, state: Any = None, *_: Any) -> Any:
+        """Command as `Policy.predict`, whatever is observed."""
+        return self.commands(len(observation)), state
+
+
+class RandomActions(ZeroAction):
+    """Commands that are drawn anew in each control interval, evenly from [-1, 1]."""
+
+    def __init__(self, n_commands: int) -> None:
+        super().__init__(n_commands)
+        self.random = np.random.default_rng(0)
+
+    def commands(self, n_ships: int) -> Any:
+        """Return the commands of ships, shape (n_ships, n_commands)."""
+        shape = (n_ships, self.n_commands)
+        return self.random.uniform(-1.0, 1.0, shape).astype(np.float32)
+
+
+def yardsticks(task: BenchmarkTask) -> Mapping[str, Policy]:
+    """Policies by name that show what an agent is worth on a task.
+
+    They are the action zero, random actions, the rule of the task's file where it has
+    one, and LQ where she has one for the task.
+    """
+    asked = task.task
+    found: dict[str, Policy] = {
+        "zero action": ZeroAction(asked.n_commands),
+        "random actions": RandomActions(asked.n_commands),
+    }
+    if asked.definition.rule is not None:
+        found["rule"] = TaskRule(asked, task.ship)
+    if asked.action == "rudder":
+        with suppress(InputError):
+            lq = design("lq", task)
+            check_fits(lq, asked, task.ship, "lq")
+            found["LQ"] = lq
+    return found
+
+
+def half_reward_cost(task: BenchmarkTask, seeds: ArrayLike) -> float:
+    """Cost of a step that is to earn half of the bounded reward of a task.
+
+    It is 0.1, the default of environments, where a step under random actions earns
+    between 0.02 and 0.98 by it; otherwise a tenth of the median cost of such a step, so
+    that a task may count in any unit.
+    """
+    engine = task.engine(len(np.asarray(seeds)))
+    random = RandomActions(task.task.n_commands)
+    run = rollout(random, engine, seeds, record=["reward_end"])
+    median = float(np.median(-run.rewards[run.sailing]))
+    earned = HALF_REWARD_COST / (HALF_REWARD_COST + max(median, 0.0))
+    faint = 0.02
+    if faint <= earned <= 1.0 - faint or not median > 0.0:
+        return HALF_REWARD_COST
+    return 0.1 * median
