@@ -14,7 +14,8 @@ from math import atan, atan2, cos, exp, hypot, pi, sin
 import numpy as np
 from numba import njit
 
-#: Found by CMA-ES (`scripts/example_rules.py`); lengths and the time of one as units.
+#: Set by hand; `scripts/encounters.py --tune` searches others. In lengths and the time of
+#: one.
 OBSTACLES = {
     "safe": 3.0,  # distance to pass at
     "risk": 3.0,  # weight of a ship that she would hit now
