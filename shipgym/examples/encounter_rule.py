@@ -14,8 +14,7 @@ from math import atan, atan2, cos, exp, hypot, pi, sin
 import numpy as np
 from numba import njit
 
-#: Set by hand; `scripts/encounters.py --tune` searches others. In lengths and the time of
-#: one.
+#: Set by hand, in lengths and the time of one; `scripts/encounters.py` can search.
 OBSTACLES = {
     "safe": 3.0,  # distance to pass at
     "risk": 3.0,  # weight of a ship that she would hit now

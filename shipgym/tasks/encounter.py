@@ -4,8 +4,8 @@ Half of the episodes are one of the 22 cases of Imazu (1987) with jitter, the ot
 random crossings, head-on meetings and overtakings (`shipgym.tasks.other_ships`). A step
 costs the way that is not made good along the track, the distance off it, the rudder,
 and where own ship is inside an ellipse around another (Fujii & Tanaka 1971). Apart from
-the cost, `info` tells where she is closer than the least distance, a constraint, and
-counts the rules of COLREG that she has broken.
+the cost, a constraint is the least distance to the others, and `info` counts the rules
+of COLREG that she has broken.
 """
 
 from typing import Annotated, NamedTuple
@@ -66,10 +66,10 @@ from shipgym.tasks.traffic import approach, own_velocity
 NAME = "Encounter"
 EPISODE_STEPS = 300
 STEPS_PER_LENGTH = 4.0
+CONSTRAINTS = ("clearance",)
 REPORTED = (
     "cross_track",
     "closest",
-    "too_close",
     "success",
     "rule_13",
     "rule_14",
@@ -136,7 +136,7 @@ class State(NamedTuple):
     watches: tuple[Watch, Watch, Watch, Watch]
     cross_track: float  # m
     closest: float  # m, least distance to another so far
-    too_close: Flag  # now closer than the least distance
+    clearance: float  # how far closer than the least distance, in parts of it
     success: Flag
     rule_13: float  # how often it was broken so far
     rule_14: float
@@ -209,7 +209,7 @@ def begin(
         watches=(watch, watch, watch, watch),
         cross_track=aside,
         closest=2.0 * run,
-        too_close=0.0,
+        clearance=0.0,
         success=0.0,
         rule_13=0.0,
         rule_14=0.0,
@@ -324,6 +324,7 @@ def state_after(
     course = course_to_track(motion, ship)
     error = wrap(course - motion.psi)
     distance = least_distance(all_met)
+    least = settings.least_distance * ship.length
     return State(
         heading_setpoint=course,
         integral=integrated(state.integral, error, interval, ship, settings.weights),
@@ -331,7 +332,7 @@ def state_after(
         watches=(one.watch, two.watch, three.watch, four.watch),
         cross_track=motion.y,
         closest=min(state.closest, distance),
-        too_close=one_if(distance < settings.least_distance * ship.length),
+        clearance=max(1.0 - distance / least, 0.0),
         success=one_if(success),
         rule_13=state.rule_13 + broken.rule_13,
         rule_14=state.rule_14 + broken.rule_14,
