@@ -1,8 +1,8 @@
 """Settings of learning: one frozen dataclass an algorithm, read from TOML.
 
 The files in `hyperparameters/` have the tuned values that differ from the defaults
-here, later tables before earlier ones: `defaults`, to learn from scratch; `own`, to
-learn a task of a user's file from scratch; those with a base in an environment
+here, later tables before earlier ones: `defaults`, to learn from scratch; `own`, for
+tasks other than course keeping and path following; those with a base in an environment
 (`residual`), on every task of a suite (`suites`), on one of them (`tasks`).
 """
 
@@ -355,11 +355,12 @@ def load_settings(
     given = given or {}
     tables = shipped_toml("agents.training", f"hyperparameters/{algorithm}.toml")
     values = dict(tables["defaults"])
-    if environment.endswith(".py") and given.get("base", "none") == "none":
+    residual = tables["residual"]
+    if environment not in residual and given.get("base", "none") == "none":
         values |= tables["own"]
     has_base = action == "rudder" and given.get("base") != "none"
     if has_base:
-        values |= tables["residual"].get(environment, {})
+        values |= residual.get(environment, {})
     if has_base and suite in tables["suites"]:
         values |= tables["suites"][suite]
         tasks = tables.get("tasks", {})

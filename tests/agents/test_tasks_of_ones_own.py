@@ -69,6 +69,7 @@ def test_a_task_of_ones_own_is_learned_with_settings_of_its_own():
     own = load_settings("ppo", "/home/me/turn.py")
     assert (own.base, own.reward, own.reward_scale) == ("none", "bounded", "running")
     assert own.rollout == 2048
+    assert load_settings("ppo", "encounter") == own
     assert own.log_std_end == "learned"
     for given in ({"base": "lq"}, {"base": "pid"}):
         added = load_settings("ppo", "/home/me/turn.py", given=given)
