@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -39,6 +39,7 @@ Space = (
 )
 DEFAULT_MODEL = "mariner-tls-svm"
 DEFAULT_TASK = "CourseKeeping"
+LONGEST = "max_episode_steps"  # keyword of vector environments
 PACE = ("action_repeat", "rate_limit", "frame_stack")  # keywords that make a `Pace`
 
 
@@ -124,6 +125,20 @@ def given_orders(
     columns = array.reshape(-1, len(orders)).T
     ordered = [known[chosen] for known, chosen in zip(orders, columns, strict=True)]
     return np.stack(ordered, axis=-1)
+
+
+class ShipSpec(EnvSpec):
+    """Registration of an environment of shipgym."""
+
+    def to_json(self) -> str:
+        """Return the registration as JSON; InputError with a model that has no file."""
+        model = self.kwargs.get("model")
+        if isinstance(model, ShipModel):
+            raise InputError(
+                "spec: model: expected a name or the path of a model file, which JSON"
+                f" can hold, got a ShipModel, {model.name!r}; save it and give its path"
+            )
+        return super().to_json()
 
 
 class ShipsEnv:
@@ -252,8 +267,14 @@ class ShipsEnv:
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        steps = -(-self.task.episode_steps // self.pace.action_repeat)
-        self._spec = spec and replace(spec, max_episode_steps=steps)
+        self._spec = None
+        if spec is not None:
+            given = {
+                one.name: getattr(spec, one.name) for one in fields(spec) if one.init
+            }
+            steps = -(-self.task.episode_steps // self.pace.action_repeat)
+            given[LONGEST] = min(steps, spec.kwargs.get(LONGEST) or steps)
+            self._spec = ShipSpec(**given)
 
     @property
     def dt(self) -> float:

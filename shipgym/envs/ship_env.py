@@ -20,6 +20,7 @@ from shipgym.envs.environment import (
     given_orders,
 )
 from shipgym.envs.outputs import ANSWER_OUTCOMES, LastInfo, gather_constraints
+from shipgym.envs.starts import start_lanes
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.tasks.task import ENV_OPTIONS
@@ -139,7 +140,9 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         options : dict, optional
             Until the next reset: settings of the task by their names, such as
             `waypoints` of the path, or of several. Observations keep the scales of the
-            environment.
+            environment. `start`, for this episode alone: a dictionary of
+            `heading_error`, rad, `cross_track`, m, `speed`, m/s, `yaw_rate`, rad/s, and
+            `rudder`, rad, of the ship at the start.
 
         Returns
         -------
@@ -150,13 +153,15 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         super().reset(seed=seed)
         episodes = self._engine.episodes + np.uint64(1)
         if options or self._asked:
-            self._take(options)
+            self._take(options, "start")
         if seed is not None or self._keys is None:
             self._keys = self._drawn_keys()
             episodes[:] = 0
         self._begun = True
         self._note_end()
         self._engine.begin(self._keys, episodes)
+        if options and options.get("start"):
+            start_lanes(self._engine, options["start"], self._engine.all_lanes)
         self._draw_and_show()
         numbers = self._outcomes[ANSWER_OUTCOMES:].tolist()
         return self._seen(self._engine.all_lanes), self._info(numbers)

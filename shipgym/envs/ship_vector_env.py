@@ -11,7 +11,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from shipgym.arrays import Flags, Floats
-from shipgym.checks import check_keys, quoted, unexpected
+from shipgym.checks import check_keys, check_whole, quoted, unexpected
 from shipgym.envs.engine import episode_keys
 from shipgym.envs.environment import (
     DEFAULT_MODEL,
@@ -20,6 +20,7 @@ from shipgym.envs.environment import (
     given_orders,
 )
 from shipgym.envs.outputs import LastInfo, gather_constraints, named_rows
+from shipgym.envs.starts import start_lanes
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.tasks.task import VECTOR_OPTIONS
@@ -49,6 +50,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         When the next episode of a row begins.
     threads : int
         Number of threads that share the rows; the results do not depend on it.
+    max_episode_steps : int, optional
+        Steps after which an episode is cut off, as by `gymnasium.make`.
     action_repeat, rate_limit, frame_stack, constraint_cost, **options
         As for the single environment.
     """
@@ -62,6 +65,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         allow_unstable: bool = False,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int = 1,
+        max_episode_steps: int | None = None,
         action_repeat: int = 1,
         rate_limit: float | None = None,
         frame_stack: int = 1,
@@ -88,6 +92,10 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         self._names = self.task.info_names
         self._flags = self._engine.flag_names
         self._own_reward = not self.task.definition.shipped
+        self._longest = np.inf
+        if max_episode_steps is not None and max_episode_steps != -1:
+            longest = check_whole(max_episode_steps, "max_episode_steps", at_least=1)
+            self._longest = longest * self.pace.action_repeat
         self._some_over = False  # NEXT_STEP: whether episodes ended in the last step
         self._keeps_ends = mode is AutoresetMode.DISABLED
         self._over = np.zeros(self.num_envs, dtype=np.bool_)  # then, rows to reset
@@ -125,7 +133,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         options : dict, optional
             `reset_mask`, bool array of shape (num_envs,): rows in which an episode is
             to begin, the others go on. Or those of the single environment, for all
-            rows.
+            rows; numbers of `start` may be arrays of shape (num_envs,).
 
         Returns
         -------
@@ -137,7 +145,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         mask = self._mask(options)
         episodes = self._engine.episodes + np.uint64(1)
         if mask.all():
-            self._take(options, "reset_mask")
+            self._take(options, "reset_mask", "start")
         engine = self._engine
         self._keys, episodes = self._next_episodes(seed, mask, episodes)
         shown_before = engine.outputs
@@ -146,6 +154,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         self._begun = True
         self._over = self._over & ~mask
         engine.begin(self._keys, episodes, mask)
+        if options and options.get("start"):
+            start_lanes(engine, options["start"], mask)
         self._draw(mask)
         infos = self._infos(mask.copy())
         return self._shown(mask), infos
@@ -207,7 +217,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         if not mask.all():
             # other options apply to the engine, which all rows share
             where = "options with a reset_mask of some rows"
-            check_keys(options, ["reset_mask"], where)
+            check_keys(options, ["reset_mask", "start"], where)
         return np.asarray(mask)
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
@@ -259,6 +269,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         if self._own_reward and not isfinite(rewards.sum()):
             engine.refuse_rewards()
 
+        if self._longest < self.task.episode_steps:
+            n_ended += self._cut_off()
         observations = self._shown()
         infos = self._infos(engine.all_lanes)
         self._some_over = n_ended > 0 and not self._keeps_ends
@@ -280,6 +292,17 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             outputs.truncated,
             infos,
         )
+
+    def _cut_off(self) -> int:
+        """Truncate episodes of the largest number of steps; return how many went on."""
+        engine = self._engine
+        over = engine.read("ended") > 0.0
+        repeat = self.pace.action_repeat
+        late = repeat * np.ceil(engine.steps / repeat) >= self._longest
+        engine.write("ended", np.where(late, 1.0, over))
+        engine.outputs.truncated |= late
+        engine.outputs.outcomes[2] = engine.outputs.truncated
+        return int((late & ~over).sum())
 
     def _refuse_over(self) -> NoReturn:
         """Raise the InputError of rows that nobody has reset."""

@@ -39,6 +39,7 @@ VECTOR_OPTIONS = (
     *ENV_OPTIONS,
     "autoreset_mode",
     "threads",
+    "max_episode_steps",
 )
 
 ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft", "rudder-shaft-discrete")
@@ -51,7 +52,7 @@ RUDDER_ORDERS = (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 1.0)
 #: Shaft orders of a discrete action, parts of the speed at service speed, as of an
 #: engine telegraph; those astern only where the propeller is known astern.
 _SHAFT_ORDERS = (-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
-_RESET_MASK = "reset_mask"  # option of a reset that is no setting of the task
+_RESET_OPTIONS = ("reset_mask", "start")  # that are no settings of the task
 
 
 class Observed(NamedTuple):
@@ -212,7 +213,7 @@ class Task:
         if sensors is not None:
             names += sensors.settings
         for name in names:
-            taken = name in VECTOR_OPTIONS or name == _RESET_MASK
+            taken = name in VECTOR_OPTIONS or name in _RESET_OPTIONS
             if names.count(name) > 1 or taken:
                 source = definition.source
                 if sensors is not None and name in sensors.settings:

@@ -4,6 +4,7 @@ import copy
 import pickle
 from functools import partial
 
+import cloudpickle
 import gymnasium
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from gymnasium.wrappers import RecordEpisodeStatistics, TimeAwareObservation
 from gymnasium.wrappers.vector import RecordEpisodeStatistics as VectorStatistics
 from stable_baselines3.common.monitor import Monitor
 
-from shipgym import InputError, load_model
+from shipgym import InputError, ShipVecEnv, load_model
 from shipgym.envs.engine import Engine, episode_keys
 from shipgym.tasks import course_keeping_task
 
@@ -178,6 +179,68 @@ def test_constraints_stand_apart_from_the_cost():
     assert other["objective"] > info["cost"]
     with pytest.raises(InputError, match="constraint_cost: expected a task with const"):
         one(COURSE, constraint_cost=True)
+
+
+def test_an_episode_starts_as_asked():
+    start = {"heading_error": 0.2, "cross_track": 30.0, "speed": 6.0, "rudder": 0.1}
+    env, rows = one(), many()
+    seen, info = env.reset(seed=1, options={"start": start})
+    state = env.unwrapped.physical_state()
+    assert (state["u"], state["delta"]) == (6.0, 0.1)
+    found = [info["heading_error"], info["cross_track"], np.arctan2(seen[0], seen[1])]
+    assert found == pytest.approx([0.2, 30.0, 0.2], abs=1e-6)
+    by_row = {**start, "cross_track": [0.0, 30.0, -20.0]}
+    shown, infos = rows.reset(seed=0, options={"start": by_row})
+    np.testing.assert_array_equal(shown[1], seen)
+    np.testing.assert_allclose(infos["cross_track"], by_row["cross_track"], atol=1e-9)
+    action = np.full((3, 1), 0.3, dtype=np.float32)
+    np.testing.assert_array_equal(rows.step(action)[0][1], env.step(action[0])[0])
+    for asked, message in (
+        ({"cross_track": 1e5}, "start: expected a ship .* lost or arrived in lane 0"),
+        ({"speed": 1e3}, "start: expected a ship .* beyond the physical range"),
+        ({"rudder": 3.0}, "start: rudder: expected at most 0.69"),
+        ({"sped": 3.0}, "Did you mean 'speed'"),
+        ({"speed": [1.0, 2.0]}, "start: speed: expected a number or 1, got shape"),
+    ):
+        with pytest.raises(InputError, match=message):
+            env.reset(options={"start": asked})
+
+
+def test_the_largest_number_of_steps_means_the_same_for_one_and_many():
+    env = one(COURSE, max_episode_steps=7)
+    rows = many(COURSE, max_episode_steps=7)
+    assert rows.spec.max_episode_steps == env.spec.max_episode_steps == 7
+    env.reset(seed=0)
+    rows.reset(seed=0)
+    for step in range(7):
+        action = np.full((3, 1), 0.1, dtype=np.float32)
+        *_, truncated, _ = env.step(action[0])
+        assert truncated == rows.step(action)[3][0] == (step == 6)
+    assert gymnasium.make_vec(rows.spec).num_envs == 3
+
+
+def test_a_spec_with_a_model_at_hand_says_that_it_has_no_file():
+    env = one(COURSE, model=load_model("mariner"))
+    with pytest.raises(InputError, match="spec: model: expected a name or the path"):
+        env.spec.to_json()
+
+
+@pytest.mark.parametrize(
+    "again",
+    [copy.deepcopy, lambda env: cloudpickle.loads(cloudpickle.dumps(env))],
+    ids=["copy", "cloudpickle"],
+)
+def test_a_copy_of_ships_for_stable_baselines3_goes_on_as_they_do(again):
+    env = ShipVecEnv(COURSE, 2, seed=3, model="mariner", episode_steps=9)
+    env.reset()
+    action = np.full((2, 1), 0.3, dtype=np.float32)
+    for _ in range(4):
+        env.step(action)
+    other = again(env)
+    for _ in range(12):
+        first, second = env.step(action), other.step(action)
+        np.testing.assert_array_equal(first[0], second[0])
+        np.testing.assert_array_equal(first[1], second[1])
 
 
 def three_ships():
