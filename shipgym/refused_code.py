@@ -4,7 +4,7 @@ import ast
 import inspect
 import random
 from collections.abc import Iterator
-from dis import get_instructions
+from dis import Instruction, get_instructions
 from textwrap import dedent
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
@@ -21,6 +21,8 @@ _GENERATORS = (np.random.RandomState, np.random.Generator, random.Random)
 
 def refuse_foreign_random(function: FunctionType) -> None:
     """Refuse random numbers of `numpy.random` or `random`, with file and line.
+
+    Attributes of functions are refused too: compiled functions have none.
 
     The functions that it calls are searched too. Such numbers are neither those of the
     episode's seed nor the same for one ship and many.
@@ -50,17 +52,32 @@ def _foreign_random(function: Any, known: set[Any]) -> Iterator[tuple[str, str]]
 def _named_values(code: CodeType, names: dict[str, Any]) -> Iterator[tuple[int, Any]]:
     """Line and value of each global that code names, and of attributes of modules."""
     value: Any = None
+    called = ""  # name of the last global
     for instruction in get_instructions(code):
         if instruction.opname == "LOAD_GLOBAL":
-            value = names.get(instruction.argval)
+            called = instruction.argval
+            value = names.get(called)
         elif instruction.opname in ("LOAD_ATTR", "LOAD_METHOD"):
+            if isinstance(value, FunctionType):
+                name = instruction.argval
+                raise InputError(
+                    f"{code.co_filename}, line {line_of(instruction, code)}, in"
+                    f" {code.co_name}: expected attributes of functions to be read at"
+                    f" the top of the file, got {called}.{name}; write"
+                    f" {name.upper()} = {called}.{name} there"
+                )
             is_module = isinstance(value, ModuleType)
             value = getattr(value, instruction.argval, None) if is_module else None
         else:
             value = None
-        positions = instruction.positions
-        line = positions.lineno if positions else None
-        yield line or code.co_firstlineno, value
+        yield line_of(instruction, code), value
+
+
+def line_of(instruction: Instruction, code: CodeType) -> int:
+    """Return the line of an instruction, or the first of its code."""
+    positions = instruction.positions
+    line = positions.lineno if positions else None
+    return line or code.co_firstlineno
 
 
 def _module_of(value: Any) -> str:

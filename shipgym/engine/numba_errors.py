@@ -7,6 +7,7 @@ from typing import Any
 from shipgym.errors import InputError
 from shipgym.python_files import LIBRARIES
 
+COLOUR = r"\x1b\[[\d;]*m"
 #: Plain words for reasons of Numba that are hard to understand.
 PLAINLY = {
     r"Unknown attribute '(\w+)' of type Module\(<module '((?!numpy|math)[\w.]+)'.*": (
@@ -27,8 +28,7 @@ def explanation(error: Exception, what: str) -> str:
 
     It names the function and the line of the innermost call, where Numba does.
     """
-    colour = r"\x1b\[[\d;]*m"
-    text = re.sub(colour, "", str(error))
+    text = re.sub(COLOUR, "", str(error))
     reason = _reason(text)
     for found, meant in PLAINLY.items():
         reason = re.sub(found, meant, reason)
@@ -43,13 +43,17 @@ def refuse_unset(warning: Any) -> None:
 
     Python fails where such a variable is used; compiled code takes a 0 for it.
     """
-    name = re.search(r"uninitialized variable (\w+)", str(warning))
-    file = str(Path(warning.loc.filename).resolve()) if name else ""
-    if name and not file.startswith(("<", *LIBRARIES)):
+    text = re.sub(COLOUR, "", str(warning))
+    name = re.search(r"uninitialized variable (\w+)", text)
+    place = re.search(r'File "([^"]+)", line (\d+)', text)
+    if not (name and place) or place[1].startswith("<"):
+        return
+    file = str(Path(place[1]).resolve())
+    if not file.startswith(LIBRARIES):
         raise InputError(
-            f"{file}, line {warning.loc.line}: expected variables that are set in every"
-            f" case, got {name[1]!r}, which is not; give it a value before the if or"
-            " the loop that sets it"
+            f"{file}, line {place[2]}: expected variables that are set in every case,"
+            f" got {name[1]!r}, which is not; give it a value before the if or the loop"
+            " that sets it"
         )
 
 

@@ -29,6 +29,10 @@ from shipgym.tasks.task import Task, course_keeping_task
 Observation = NDArray[np.float32]
 
 
+#: Programs whose first step was taken in plain Python.
+_TRIED: set[EpisodeProgram] = set()
+
+
 class Engine(Lanes):
     """A task for many ships at once.
 
@@ -150,6 +154,11 @@ class Engine(Lanes):
 
     def _compiled(self, program: EpisodeProgram) -> Any:
         """Return the loop of a program; InputError names what does not compile."""
+        if program.users_code and program not in _TRIED:
+            # compiled, a loop that does not end cannot be stopped
+            if fault := fault_in_python(self.model, self.task):
+                raise InputError(fault)
+            _TRIED.add(program)
         try:
             run = entry_of(program.run)
         except InputError as error:

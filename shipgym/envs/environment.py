@@ -184,7 +184,7 @@ class ShipsEnv:
                 also=", or None",
             )
 
-        self.model, self.task, randomisation = read_options(
+        self.model, self.task, self.randomisation = read_options(
             given["task"], given["model"], options, taken
         )
         self.pace = Pace(*(given[name] for name in PACE))
@@ -201,7 +201,7 @@ class ShipsEnv:
             self.model,
             num_envs,
             self.task,
-            randomisation,
+            self.randomisation,
             allow_unstable=given["allow_unstable"],
             threads=given.get("threads", 1),
         )

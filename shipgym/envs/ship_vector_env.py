@@ -21,6 +21,7 @@ from shipgym.envs.environment import (
 )
 from shipgym.envs.outputs import LastInfo, gather_constraints, named_rows
 from shipgym.envs.starts import start_lanes
+from shipgym.envs.task_checker import check_once
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.tasks.task import VECTOR_OPTIONS
@@ -77,6 +78,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         observation_space, action_space = self._make(
             arguments, VECTOR_OPTIONS, ["rgb_array"]
         )
+        if self._engine.program.users_code:
+            check_once(self.model, self.task, self.randomisation)
         self.num_envs = int(num_envs)
         self.metadata = {
             "render_modes": ["rgb_array"],

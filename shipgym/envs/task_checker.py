@@ -2,14 +2,18 @@
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.arrays import Floats
+from shipgym.engine import episodes
+from shipgym.engine.cache import cached_path
 from shipgym.engine.episode_program import EpisodeProgram
+from shipgym.engine.fingerprint import fingerprint
 from shipgym.engine.records import flat, leaves
+from shipgym.engine.specialise import loaded_names
 from shipgym.envs.engine import Engine
 from shipgym.envs.environment import DEFAULT_MODEL, read_options
 from shipgym.envs.plain_python import plain_loop
@@ -23,6 +27,7 @@ from shipgym.tasks.task import Task
 STEPS = 400
 PLAIN_STEPS = 40  # in plain Python
 PLAIN_LANES = 3
+SELDOM = 0.05  # share of the steps that a rare event has at most
 RARE = 20.0  # times the median of its magnitude that a rare reward is at least
 
 
@@ -44,17 +49,43 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
     among them.
     """
     ship = options.pop("model", DEFAULT_MODEL)
-    more_than_a_tile = 70
     try:
         model, given, randomisation = read_options(task, ship, options)
-        plain, seen = _plain_engine(model, given, randomisation)
-        _sail_in_python(plain)
-        plain.shapes(0)
-        few = Engine(model, PLAIN_LANES, given, randomisation)
-        many = Engine(model, more_than_a_tile, given, randomisation)
-        one = Engine(model, 1, given, randomisation)
+        return _checked(model, given, randomisation)
     except InputError as error:
         return TaskCheck(str(task), (str(error),))
+
+
+def check_once(model: ShipModel, task: Task, randomisation: Randomisation) -> None:
+    """Check a task of a user's own if it is new; InputError tells its problems.
+
+    A file in the cache folder stands for one that was sound.
+    """
+    program = Engine(model, 1, task, randomisation, allow_unstable=True).program
+    if not (program.users_code and task.checked):
+        return
+    content = fingerprint(episodes.run, program.hooks)
+    known = cached_path(content, repr((model.name, task.settings, task.options)))
+    mark = known.with_suffix(".sound") if known else None
+    if mark and mark.exists():
+        return
+    found = _checked(model, task, randomisation)
+    if found.problems:
+        raise InputError(found.problems[0])
+    if mark:
+        mark.touch()
+
+
+def _checked(model: ShipModel, given: Task, randomisation: Randomisation) -> TaskCheck:
+    """Check a task with a ship; InputError where it fails."""
+    more_than_a_tile = 70
+    plain, seen = _plain_engine(model, given, randomisation)
+    _sail_in_python(plain)
+    plain.shapes(0)
+    few, many, one = (
+        Engine(model, n, given, randomisation, allow_unstable=True)
+        for n in (PLAIN_LANES, more_than_a_tile, 1)
+    )
 
     compiled_and_plain = _differ(
         few,
@@ -73,7 +104,8 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
         ways=("among many ships", "alone"),
     )
     problems = [*_not_finite(many), *compiled_and_plain, *many_and_one]
-    remarks = [*_often_clipped(given, seen), *_hard_to_learn(many)]
+    remarks = [*_often_clipped(given, seen), *_printed(many)]
+    remarks += list(_positive(many)) or list(_hard_to_learn(many))
     return TaskCheck(given.name, tuple(problems), tuple(remarks))
 
 
@@ -101,7 +133,10 @@ def _plain_engine(
         store = program.hooks["store_observation"]
         return plain_loop(program, {"store_observation": partial(noted, store)})
 
-    return Engine(model, PLAIN_LANES, task, randomisation, loop=loop), seen
+    engine = Engine(
+        model, PLAIN_LANES, task, randomisation, allow_unstable=True, loop=loop
+    )
+    return engine, seen
 
 
 def _orders(engine: Engine, step: int) -> Floats:
@@ -252,8 +287,44 @@ def _often_clipped(task: Task, seen: dict[str, list[float]]) -> Iterator[str]:
             )
 
 
-def _random_rewards(engine: Engine) -> Floats:
-    """Rewards of ships in each step up to their ends, under random orders.
+def _printed(engine: Engine) -> Iterator[str]:
+    """Remark on users' functions that print."""
+    for function in engine.program.users_code:
+        if "print" in loaded_names(function.__code__):
+            yield (
+                f"{place_of(function)}: expected no print, which every ship would do in"
+                " every step, got one; take it out, and report what you want to see"
+                " with REPORTED"
+            )
+
+
+def _positive(engine: Engine) -> Iterator[str]:
+    """Ask about parts of the reward that are positive, under random orders."""
+    often = 0.05  # share of steps
+    sailed = _sailed_at_random(engine)
+    source = engine.task.definition.reward_source
+    for name, parts in zip(engine.task.reward_parts, sailed.parts.T, strict=True):
+        share = float(np.mean(parts > 0.0))
+        if share > often:
+            yield (
+                f"{source}: {name}: expected costs, written with a minus, got positive"
+                f" numbers in {100.0 * share:.0f} % of the steps, up to"
+                f" {parts.max():.3g}: are these costs? write them with a minus; a bonus"
+                " for each step is not needed, since the engine pays for steps of"
+                " little cost"
+            )
+
+
+class _Sailed(NamedTuple):
+    """Steps of many ships under random orders."""
+
+    rewards: Floats  # shape (n_steps,)
+    parts: Floats  # before they are bounded, shape (n_steps, n_parts)
+    lost: bool  # whether any ship was lost
+
+
+def _sailed_at_random(engine: Engine) -> _Sailed:
+    """Sail ships up to their ends under random orders.
 
     Each order is held for twenty control intervals.
     """
@@ -265,30 +336,37 @@ def _random_rewards(engine: Engine) -> Floats:
     engine.reset(np.arange(n_ships))
 
     earned = []
+    parts = []
     for step in range(engine.task.episode_steps):
         if step % held == 0:
             orders = random.uniform(-1.0, 1.0, shape)
         _, rewards, terminated, truncated = engine.step(orders)
         earned.append(rewards[sailing])
+        parts.append(engine.reward_parts[sailing])
         sailing &= ~(terminated | truncated)
         if not sailing.any():
             break
-    return np.concatenate(earned)
+    all_parts = np.concatenate(parts)
+    is_lost = bool((all_parts[:, -1] < 0.0).any())
+    return _Sailed(np.concatenate(earned), all_parts, is_lost)
 
 
 def _hard_to_learn(engine: Engine) -> Iterator[str]:
     """Remark on rewards of which most lies in rare events, or that hardly differ."""
     most = 0.2  # share of all reward in rare events that learners cope with
     faint = 0.02  # bounded reward that most steps should earn
-    rewards = _random_rewards(engine)
+    rewards, _, lost = _sailed_at_random(engine)
     size = np.abs(rewards)
     median = float(np.median(size))
-    rare_share = float(size[size > RARE * median].sum() / max(size.sum(), 1e-300))
+    is_large = size > RARE * median
+    rare_share = float(size[is_large].sum() / max(size.sum(), 1e-300))
     largest = float(rewards[size.argmax()])
-    if rare_share > most:
-        remedy = "lower loss_horizon, or give a larger scale as bounded"
-        if engine.task.half_reward_cost == 0.0:
-            remedy = "leave bounded=True, or lower loss_horizon"
+    if rare_share > most and is_large.mean() < SELDOM:
+        is_bounded = engine.task.half_reward_cost > 0.0
+        remedy = (
+            "give a larger scale as bounded" if is_bounded else "leave bounded=True"
+        )
+        remedy += ", or lower loss_horizon" if lost else ""
         yield (
             f"reward: expected at most {100.0 * most:.0f} % of all reward in steps of"
             f" more than {RARE:g} times the median, {median:.3g}, got"

@@ -1,12 +1,13 @@
 """What goes wrong late in a task of one's own: told with its line, never a crash."""
 
+import re
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
 
-from shipgym import InputError
+from shipgym import InputError, check_task
 
 EXAMPLES = Path(__file__).parents[2] / "shipgym" / "examples"
 FAIRWAY = (EXAMPLES / "fairway.py").read_text(encoding="utf-8")
@@ -16,48 +17,105 @@ SHIP = {"model": "kvlcc2", "action": "rudder-shaft"}
 STEP = "    x, off = motion.x"  # first line of its step
 
 
-def fairway(folder, lines):
+def fairway(folder, lines, *changes):
     """Path of a fairway with lines put before its step, and where the first stands."""
     path = folder / "fairway.py"
     text = FAIRWAY.replace(STEP, f"{lines}\n{STEP}")
     text = text.replace("REPORTED", "import numpy as np\nTABLE = np.ones(3)\nREPORTED")
+    for old, new in changes:
+        text = text.replace(old, new)
     path.write_text(text, encoding="utf-8")
     return path, text.splitlines().index(lines.splitlines()[0]) + 1
 
 
-def sail(env):
-    env.reset(seed=0)
-    ahead = np.ones(env.action_space.shape, dtype=np.float32)
-    ahead[..., 0] = 0.0
-    for _ in range(60):
-        env.step(ahead)
-
-
-def test_a_late_index_beyond_an_array_is_told_with_line_index_lane_and_step(tmp_path):
-    index = "int(motion.x / 300.0) * 1000000000000"
-    path, line = fairway(tmp_path, f"    TABLE[{index}]")
-    ships = gymnasium.make_vec(COURSE, num_envs=70, task=path, dt=10.0, **SHIP)
-    message = (
-        rf"fairway.py, line {line}, in step: IndexError: index 1000000000000 is out of"
-        r" bounds for axis 0 with size 3, in lane 0 at step \d+$"
+def late(folder):
+    """Fairway that fails at two orders of the rudder, prints, and pays a bonus."""
+    return fairway(
+        folder,
+        """    rudder = interval.rudder_command
+    index = 1000000000000 if fabs(rudder - 0.43) < 1e-6 else 0
+    zero = 0.0 if fabs(rudder - 0.77) < 1e-6 else 1.0
+    TABLE[index]
+    bad = motion.u / zero
+    if motion.x < -1e9:
+        print(bad)""",
+        ("Reward(-off * off, -delay", "Reward(1.0, -delay - 1e-9 * bad"),
     )
-    with pytest.raises(InputError, match=message):
-        sail(ships)
-    with pytest.raises(InputError, match=message):
-        sail(gymnasium.make(COURSE, task=path, dt=10.0, **SHIP))
 
 
-def test_a_division_by_zero_that_reaches_the_reward_is_told_with_its_line(tmp_path):
-    late = "    zero = 0.0 if motion.x > 300.0 else 1.0\n"
-    path, line = fairway(tmp_path, f"{late}    bad = motion.u / zero")
-    path.write_text(path.read_text().replace("-delay,", "-delay - bad,"))
-    ships = gymnasium.make_vec(COURSE, num_envs=3, task=path, dt=10.0, **SHIP)
+def sail(env, rudder):
+    """Take two steps ahead, and one with an order that no check gives."""
+    env.reset(seed=0)
+    orders = np.ones(env.action_space.shape, dtype=np.float32)
+    for order in (0.0, 0.0, rudder):
+        orders[..., 0] = order
+        env.step(orders)
+
+
+def test_what_fails_late_is_told_with_line_lane_and_step(tmp_path):
+    path, line = late(tmp_path)
+    ships = gymnasium.make_vec(COURSE, num_envs=70, task=path, **SHIP)
     with pytest.raises(
         InputError,
-        match=rf"reward_delay: expected a finite number, got -inf in lane 0 at step \d+"
-        rf"; .*line {line + 1}, in step: FloatingPointError: divide by zero",
+        match=rf"fairway.py, line {line + 3}, in step: IndexError: index 1000000000000"
+        r" is out of bounds for axis 0 with size 3, in lane 0 at step 3$",
     ):
-        sail(ships)
+        sail(ships, 0.43)
+    with pytest.raises(
+        InputError,
+        match=r"reward_delay: expected a finite number, got -inf in lane 0 at step 3;"
+        rf" .*line {line + 4}, in step: FloatingPointError: divide by zero",
+    ):
+        sail(ships, 0.77)
+
+
+def test_positive_rewards_and_prints_are_asked_about(tmp_path):
+    path, _ = late(tmp_path)
+    printed, positive = check_task(path, **SHIP).remarks
+    assert "in step: expected no print" in printed
+    assert "reward_cross_track: expected costs, written with a minus" in positive
+    assert "100 % of the steps, up to 1: are these costs?" in positive
+
+
+def test_a_vector_environment_checks_a_new_task(tmp_path):
+    path, line = fairway(tmp_path, "    TABLE[int(interval.steps / 9.0)]")
+    message = (
+        rf"line {line}, in step: IndexError: index 3 .* at step 27 in plain Python"
+    )
+    with pytest.raises(InputError, match=message):
+        gymnasium.make_vec(COURSE, num_envs=3, task=path, **SHIP)
+
+
+def test_a_loop_that_does_not_end_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("shipgym.envs.plain_python.LONGEST_CALL", 0.2)
+    path, line = fairway(tmp_path, "    while motion.x < 1e9:\n        pass")
+    message = rf"line ({line}|{line + 1}), in step: TimeoutError: .* does not end"
+    with pytest.raises(InputError, match=message):
+        gymnasium.make(COURSE, task=path, **SHIP)
+
+
+def test_attributes_of_functions_are_read_at_the_top(tmp_path):
+    head = "def helm(x):\n    return x\n\n\nREPORTED"
+    path, line = fairway(tmp_path, "    helm.start", ("REPORTED", head))
+    message = rf"line {line}, in step: .* got helm.start; write START = helm.start"
+    with pytest.raises(InputError, match=message):
+        gymnasium.make(COURSE, task=path, **SHIP)
+
+
+@pytest.mark.skipif(not CASES.is_dir(), reason="the cases are not beside the checkout")
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("float_reward", "line 59, in step: result 2: expected Reward, got a number"),
+        ("nan", "line 61, in step: FloatingPointError: divide by zero"),
+        ("swap_observe_args", "observe: expected a function observe.readings, state"),
+        ("vessel_start_inside", "line 51, in begin: .* write START = ferry.start"),
+        ("late_index_1e12", "line 86, in step: IndexError: index 1000000000000 "),
+    ],
+)
+def test_slips_of_users_are_told_with_their_line(name, message):
+    (problem,) = check_task(CASES / f"{name}.py", dt=10.0, **SHIP).problems
+    assert re.search(message, problem)
 
 
 def test_a_variable_that_may_be_unset_is_refused_with_its_line(tmp_path):
