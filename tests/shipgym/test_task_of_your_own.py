@@ -403,13 +403,12 @@ def test_a_reward_that_is_not_finite_is_named(tmp_path):
         text.replace("/ 0.0", "/ (state.heading_setpoint - state.heading_setpoint)"),
     )
     message = r"reward_rudder: expected a finite number, got nan in lane 0 at step 1"
-    for env in (
-        gymnasium.make(COURSE, reward=path),
-        gymnasium.make_vec(COURSE, num_envs=2, reward=path),
-    ):
-        env.reset(seed=0)
-        with pytest.raises(InputError, match=message):
-            env.step(env.action_space.sample())
+    env = gymnasium.make(COURSE, reward=path)
+    env.reset(seed=0)
+    with pytest.raises(InputError, match=message):
+        env.step(env.action_space.sample())
+    with pytest.raises(InputError, match="in reward: FloatingPointError"):
+        gymnasium.make_vec(COURSE, num_envs=2, reward=path)
     problem = check_task("CourseKeeping", reward=path).problems[0]
     assert re.search(r"my_reward.py, line \d+, in reward: FloatingPoint", problem)
 
