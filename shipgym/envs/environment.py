@@ -273,7 +273,8 @@ class ShipsEnv:
                 one.name: getattr(spec, one.name) for one in fields(spec) if one.init
             }
             steps = -(-self.task.episode_steps // self.pace.action_repeat)
-            given[LONGEST] = min(steps, spec.kwargs.get(LONGEST) or steps)
+            longest = spec.kwargs.get(LONGEST) or -1
+            given[LONGEST] = min(steps, longest) if longest > 0 else steps
             self._spec = ShipSpec(**given)
 
     @property
