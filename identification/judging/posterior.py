@@ -19,7 +19,8 @@ from identification.judging.sampling import (
 )
 from identification.judging.uncertainty import Uncertainty
 from identification.models.sailed import CoefficientPrior, Sailed
-from identification.models.segments import compared_channels, cut
+from identification.models.segments import Segment, compared_channels, cut
+from identification.samples.prediction import with_start
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.manoeuvres.execution import usual_rudder
@@ -96,6 +97,7 @@ def with_posterior(
     step = 0.2  # ship lengths, from sample to sample and of the integration
     whole_trials = 1e9  # lengths of a part at most
     parts = cut(trials, bare, channels, whole_trials, False, interval=step, coarse=True)
+    parts = [_begun(part, bare, trials[part.trial]) for part in parts]
     whole = Sailed(bare, channels, prior, parts)
     start = _point_of(model, prior)
     scales = whole.scales(start)
@@ -128,6 +130,18 @@ def with_posterior(
         "error_scales": by_name(whole.channels, posterior.scales),
         "remarks": remarks,
     }
+
+
+def _begun(part: Segment, model: ShipModel, trial: Trial) -> Segment:
+    """A part of a trial that begins as the predictions of the trial do."""
+    if part.inputs[0, 0] > trial.t[0]:
+        return part
+    begun = with_start(model, trial)
+    start = part.start.copy()
+    for column, name in enumerate(model.state_names):
+        if name in ("psi", *"uvr"):
+            start[column] = begun[name][0]
+    return replace(part, start=start)
 
 
 def _point_of(model: ShipModel, prior: CoefficientPrior) -> Floats:

@@ -18,7 +18,7 @@ from identification.models.least_squares import (
     Linearised,
     fit_least_squares,
 )
-from identification.models.segments import BLOCK, Segment
+from identification.models.segments import BLOCK, Segment, velocities
 from identification.models.shooting import channel_units, in_all_lanes, sail_lanes
 from shipgym import ShipModel
 from shipgym.arrays import Floats, Integers
@@ -56,7 +56,7 @@ class OutputError:
     """A fit by the errors of simulated segments: what is compared, and from where."""
 
     model: ShipModel  # gives the compiled accelerations and all but their coefficients
-    channels: Sequence[str]  # that are compared; starts of segments are fitted in them
+    channels: Sequence[str]  # that are compared
     #: coefficients of the accelerations (SI) that stand for a parameter of 1, shape
     #: (n_coefficients,)
     term_sizes: Floats
@@ -68,6 +68,16 @@ class OutputError:
     def columns(self) -> list[int]:
         """Places of the channels in the state."""
         return [self.model.state_names.index(name) for name in self.channels]
+
+    @cached_property
+    def free(self) -> tuple[str, ...]:
+        """States in which the starts of segments are fitted."""
+        return tuple(dict.fromkeys((*velocities(self.model), *self.channels)))
+
+    @cached_property
+    def free_columns(self) -> list[int]:
+        """Places of these in the state."""
+        return [self.model.state_names.index(name) for name in self.free]
 
     @cached_property
     def units(self) -> Floats:
@@ -105,7 +115,7 @@ class OutputError:
         residuals, jacobians, moves = [], [], []
         for segment in segments:
             errors, slopes = self._block_errors(coefficients, segment, scales)
-            residual, slopes, move = without_start(errors, slopes, len(self.columns))
+            residual, slopes, move = without_start(errors, slopes, len(self.free))
             residuals.append(residual)
             jacobians.append(slopes)
             moves.append(move)
@@ -115,15 +125,21 @@ class OutputError:
             moves=moves,
         )
 
-    def moved(
-        self, segments: Sequence[Segment], moves: Sequence[Floats]
+    def _moved_if_sailed(
+        self,
+        parameters: Floats,
+        segments: Sequence[Segment],
+        shooting: Shooting,
+        scales: Floats,
     ) -> list[Segment]:
-        """The segments with their starts moved."""
+        """The segments with their starts moved, but where the ship would run away."""
         found = []
-        for segment, move in zip(segments, moves, strict=True):
+        for segment, move in zip(segments, shooting.moves, strict=True):
             start = segment.start.copy()
-            start[self.columns] += move * self.units
-            found.append(replace(segment, start=start))
+            start[self.free_columns] += move * channel_units(self.model, self.free)
+            moved = replace(segment, start=start)
+            again = self.shoot(parameters, [moved], scales)
+            found.append(moved if np.isfinite(again.residuals).all() else segment)
         return found
 
     def _block_errors(
@@ -131,7 +147,7 @@ class OutputError:
     ) -> tuple[Floats, Floats]:
         """Errors of a segment averaged over blocks, and their slopes, in scales.
 
-        Shapes (n_rows,) and (n_rows, n_coefficients + n_channels).
+        Shapes (n_rows,) and (n_rows, n_coefficients + n_free).
         """
         blocks = segment.blocks
         counts = segment.block_sizes
@@ -157,9 +173,9 @@ class OutputError:
         first_term = n_numbers - len(coefficients)  # the terms' numbers come last
         nominal = np.concatenate([numbers, segment.start])
         nominal[first_term:n_numbers] = coefficients
-        starts = [n_numbers + column for column in self.columns]
+        starts = [n_numbers + column for column in self.free_columns]
         varied = np.append(np.arange(first_term, n_numbers), starts).astype(int)
-        units = np.concatenate([self.term_sizes, self.units])
+        units = np.append(self.term_sizes, channel_units(self.model, self.free))
 
         step = 1e-5
         parts = []
@@ -219,7 +235,7 @@ class OutputError:
             parameters = fit.x
             evaluations += fit.nfev
             shooting = self.shoot(parameters, segments, scales)
-            segments = self.moved(segments, shooting.moves)
+            segments = self._moved_if_sailed(parameters, segments, shooting, scales)
             scales = self.scales(shooting, scales)
 
         before = self.shoot(self.start, last_segments, last_scales)

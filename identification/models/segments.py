@@ -57,17 +57,17 @@ def compared_channels(model: ShipModel, trials: Sequence[Trial]) -> tuple[str, .
 
     Of yaw alone only the heading, where the yaw rate was derived from it.
     """
-    velocities = _velocities(model)
-    heading = "r" in velocities and all("psi" in trial for trial in trials)
+    names = velocities(model)
+    heading = "r" in names and all("psi" in trial for trial in trials)
     if not heading:
-        return velocities
+        return names
     is_derived = all("r" in trial.derived for trial in trials)
-    if velocities == ("r",) and is_derived:
+    if names == ("r",) and is_derived:
         return ("psi",)
-    return (*velocities, "psi")
+    return (*names, "psi")
 
 
-def _velocities(model: ShipModel) -> tuple[str, ...]:
+def velocities(model: ShipModel) -> tuple[str, ...]:
     """Velocities that the model has equations of."""
     table = model.dynamics
     if isinstance(table, Structure):
@@ -154,8 +154,8 @@ class _Recorded:
 
 
 def _recorded(index: int, trial: Trial, model: ShipModel) -> _Recorded:
-    velocities = (trial[name] for name in _velocities(model))
-    if preprocess.is_noisy(trial.t, velocities):
+    channels = (trial[name] for name in velocities(model))
+    if preprocess.is_noisy(trial.t, channels):
         rudder = straight(trial.t, trial["delta"])
     else:
         rudder = rebuild(trial.t, trial["delta"], model.steering)

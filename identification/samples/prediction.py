@@ -1,15 +1,17 @@
 """Predictions of recorded trials, open loop from the measured rudder.
 
-And the state from which they start where the record derived its velocities.
+And the state from which they start where its first sample is not exact.
 """
 
-from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
+from identification.samples.preprocess import is_noisy, outliers
 from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
-from shipgym.models.simulate import open_loop
+from shipgym.models.simulate import first_state, open_loop, open_loop_states
 
 COMPARED = ("u", "v", "r", "psi")
 
@@ -39,8 +41,8 @@ def is_yaw_alone(model: ShipModel) -> bool:
 def predict(model: ShipModel, trial: Trial) -> Trial | None:
     """Simulate a trial from its initial state and measured rudder.
 
-    Initial velocities that were derived are estimated (`with_start`). None if the model
-    runs away.
+    The initial state is estimated where it was not measured exactly (`with_start`).
+    None if the model runs away.
     """
     try:
         return open_loop(model, with_start(model, trial))
@@ -49,132 +51,117 @@ def predict(model: ShipModel, trial: Trial) -> Trial | None:
 
 
 def with_start(model: ShipModel, trial: Trial) -> Trial:
-    """The trial with the first velocities estimated, as far as they were derived.
+    """The trial with the first samples estimated, as far as they are not exact.
 
-    Surge speed, sway speed and yaw rate: at the end of a record a derivative is least
-    certain, the more so as the rudder moves there. Instead the start is that from which
-    the model comes nearest to the measured heading and track (velocities where there is
-    no track) over the first 1.5 ship lengths (output error with the initial state among
-    the unknowns, Maine & Iliff 1985, NASA RP-1138). A model of yaw alone is compared
-    with the heading, and only its yaw rate is estimated. A trial whose velocities were
-    measured stays as it is.
+    One sample of velocity, heading or position has all of the noise, and at the end of
+    a record a derivative is least certain, the more so as the rudder moves there.
+    Instead the start is that from which the model comes nearest to heading, measured
+    yaw rate, and track (velocities where there is no track) over the first 1.5 ship
+    lengths (output error with the initial state among the unknowns, Maine & Iliff 1985,
+    NASA RP-1138). A model of yaw alone is compared with heading and yaw rate. What was
+    measured without noise stays as it is.
     """
-    derived = [name for name in "uvr" if name in trial.derived]
-    names = [name for name in derived if name in model.state_names]
-    if is_yaw_alone(model):
-        names = [name for name in names if name == "r"]
-    if not names or "psi" not in trial:
+    opening = _opening_of(trial, model.travel_time)
+    states = ("psi", "r") if is_yaw_alone(model) else ("psi", *"uvr", *"xy")
+    names = [name for name in opening.inexact if name in states]
+    if not names or "psi" not in trial or len(opening.trial) < 3:
         return trial
-
-    length = model.particulars["length"]
-    speed = model.particulars["speed"]
-    lengths = 1.5  # sailed while the start is estimated
-    end = trial.t[0] + lengths * length / speed
-    window = trial.t <= end
-    if np.sum(window) < 3:
-        return trial
-
-    opening = _opening(model, trial, window, names)
     try:
-        start = opening.estimated_start()
+        state = _Start(model, opening, names).estimated()
     except UnstableModelError:
         return trial
-    return _begun(trial, names, start)
+    begun = {}
+    for name in names:
+        values = trial[name].copy()
+        values[0] = state[model.state_names.index(name)]
+        begun[name] = values
+    return trial.with_channels(begun)
 
 
-@dataclass(frozen=True, eq=False)
-class _Opening:
-    """The first part of a trial, and how a simulation of it is compared with it."""
+class _Opening(NamedTuple):
+    """The first part of a trial, by which its start is estimated."""
 
-    model: ShipModel
-    trial: Trial
-    names: list[str]  # channels whose first samples are estimated
-    channels: tuple[str, ...]  # those compared
-    #: errors that count as one at least, shape (n_channels, 1)
-    floors: Floats
+    trial: Trial  # without outliers
+    inexact: list[str]  # channels whose first sample has noise, or was derived
+    measured: set[str]  # channels that were not derived
 
-    def estimated_start(self) -> Floats:
-        """First samples from which the model comes nearest, shape (n_names,).
+
+@lru_cache(maxsize=64)  # every model drawn sails the same trials
+def _opening_of(trial: Trial, travel_time: float) -> _Opening:
+    """The first part of a trial; `travel_time` to sail one ship length, s."""
+    lengths = 1.5  # sailed while the start is estimated
+    sound = trial.t <= trial.t[0] + lengths * travel_time
+    inexact = []
+    for name in ("psi", *"uvr", *"xy"):
+        if name not in trial:
+            continue
+        wrong = outliers(trial.t, trial[name], may_step=False)
+        if name in trial.derived or wrong[0] or is_noisy(trial.t, [trial[name]]):
+            inexact.append(name)
+        if name not in trial.derived:
+            sound[1:] &= ~wrong[1:]
+    channels = {name: values[sound] for name, values in trial.channels.items()}
+    measured = set(trial.channels) - trial.derived
+    return _Opening(Trial(trial.t[sound], channels), inexact, measured)
+
+
+class _Start:
+    """The first state of a trial, as a model explains what follows it best."""
+
+    def __init__(self, model: ShipModel, opening: _Opening, names: list[str]) -> None:
+        self.model = model
+        self.trial = opening.trial
+        least = _least_errors(model, opening.measured)
+        self.floors = np.array(
+            list(least.values())
+        )  # errors that count as one at least
+        self.measured = np.column_stack([self.trial[name] for name in least])
+        state_names = model.state_names
+        self.compared = [state_names.index(name) for name in least]
+        length, speed = model.particulars["length"], model.particulars["speed"]
+        scale_of = {"psi": 1.0, "r": speed / length, "x": length, "y": length}
+        #: a small change of each state that is estimated, shape (n_names, n_state)
+        self.moves = np.zeros((len(names), len(state_names)))
+        for row, name in enumerate(names):
+            self.moves[row, state_names.index(name)] = 1e-4 * scale_of.get(name, speed)
+
+    def estimated(self) -> Floats:
+        """State from which the model comes nearest, shape (n_state,).
 
         Three rounds of Gauss-Newton: what is simulated is nearly linear in its start.
         The scales are renewed between them, which `scipy.optimize.least_squares` would
         take for fits of their own, of more simulations each and other last digits.
         """
-        start = np.array([self.trial[name][0] for name in self.names])
+        start = first_state(self.model, self.trial)
         scales = self.floors
         for _ in range(3):
-            start = start + self._correction(start, scales)
-            left = self._errors(start)
-            mean_squares = np.mean(left**2, axis=1, keepdims=True)
-            rms = np.sqrt(mean_squares)
-            scales = np.maximum(rms, self.floors)
+            errors, *moved = self._errors(np.vstack([start, start + self.moves]))
+            changes = [((other - errors) / scales).ravel() for other in moved]
+            residuals = (errors / scales).ravel()
+            excess, *_ = np.linalg.lstsq(np.array(changes).T, residuals, rcond=1e-6)
+            start = start - excess @ self.moves
+            left = errors - np.tensordot(excess, np.array(moved) - errors, axes=1)
+            scales = np.maximum(np.sqrt(np.mean(left**2, axis=0)), self.floors)
         return start
 
-    def _correction(self, start: Floats, scales: Floats) -> Floats:
-        """Step of Gauss-Newton from a start, by forward differences."""
-        speed = self.model.particulars["speed"]
-        rate = speed / self.model.particulars["length"]
-        units = np.array([rate if name == "r" else speed for name in self.names])
-        step = 1e-4
-
-        errors = self._errors(start)
-        slopes = []
-        for move in np.diag(step * units):
-            moved = self._errors(start + move)
-            change = (moved - errors) / scales
-            slopes.append(change.ravel())
-        jacobian = np.array(slopes).T / step
-        residuals = (errors / scales).ravel()
-
-        excess, *_ = np.linalg.lstsq(jacobian, residuals, rcond=1e-6)
-        return np.asarray(-units * excess)
-
-    def _errors(self, start: Floats) -> Floats:
+    def _errors(self, starts: Floats) -> Floats:
         """Simulated less measured channels after the first sample.
 
-        Shape (n_channels, n_samples - 1).
+        Shape (n_starts, n_samples - 1, n_channels).
         """
-        trial = self.trial
-        begun = _begun(trial, self.names, start)
-        run = open_loop(self.model, begun)
-        errors = []
-        for name in self.channels:
-            error = run[name] - trial[name]
-            errors.append(error[1:])
-        return np.array(errors)
+        states = open_loop_states(self.model, self.trial, starts)
+        errors = states[:, :, self.compared] - self.measured
+        return np.asarray(errors[:, 1:])
 
 
-def _opening(
-    model: ShipModel, trial: Trial, window: Floats, names: list[str]
-) -> _Opening:
-    """Heading, and track or velocities, in the first part of a trial."""
-    heading = np.radians(0.1)
-    floors = {"psi": heading}
-    measured = trial.channels.keys() - trial.derived
+def _least_errors(model: ShipModel, measured: set[str]) -> dict[str, float]:
+    """Channels by which a start is estimated, and their least errors, SI units."""
+    length, speed = model.particulars["length"], model.particulars["speed"]
+    least = {"psi": np.radians(0.1)}
+    if "r" in measured:
+        least["r"] = 0.02 * speed / length
     if is_yaw_alone(model):
-        pass
-    elif {"x", "y"} <= measured:
-        position = 0.005 * model.particulars["length"]
-        floors |= {"x": position, "y": position}
-    else:
-        velocity = 0.02 * model.particulars["speed"]
-        floors |= {"u": velocity, "v": velocity}
-
-    samples = {name: values[window] for name, values in trial.channels.items()}
-    return _Opening(
-        model=model,
-        trial=Trial(trial.t[window], samples),
-        names=names,
-        channels=tuple(floors),
-        floors=np.array(list(floors.values()))[:, None],
-    )
-
-
-def _begun(trial: Trial, names: list[str], start: Floats) -> Trial:
-    """The trial with other first samples of some channels."""
-    channels = {}
-    for name, first in zip(names, start, strict=True):
-        values = trial[name].copy()
-        values[0] = first
-        channels[name] = values
-    return trial.with_channels(channels)
+        return least
+    if {"x", "y"} <= measured:
+        return least | dict.fromkeys("xy", 0.005 * length)
+    return least | dict.fromkeys("uv", 0.02 * speed)

@@ -187,31 +187,9 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     the simulated state at its times. Raises InputError if a channel is missing,
     UnstableModelError where the simulated ship leaves every physical range.
     """
-    t = np.array(trial.t)
-    states = np.zeros((len(t), len(model.state_names)))
-    states[0] = _first_state(model, trial)
-    n = np.zeros(len(t))
-    if "n" in trial.channels:
-        n = np.array(trial["n"])
-    wind = wind_accelerations(trial, model.dynamics)
-    mean_wind = 0.5 * (wind[1:] + wind[:-1])
-
-    loop = ship_loop(
-        model.compiled, "open_loop", OPEN_SEA if mean_wind.any() else STILL_WATER
-    )
-    reached = loop(
-        states,
-        t,
-        np.array(trial["delta"]),
-        n,
-        mean_wind,
-        LONGEST_STEP * model.travel_time,
-        model.ship_numbers(),
-    )
-    if reached < len(t) - 1:
-        raise unstable(model, t[reached], states[reached])
+    (states,) = open_loop_states(model, trial, first_state(model, trial)[None])
     return Trial(
-        t,
+        np.array(trial.t),
         _channels(model, states),
         name=trial.name,
         kind=trial.kind,
@@ -220,7 +198,31 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     )
 
 
-def _first_state(model: ManoeuvringModel, trial: Trial) -> Floats:
+def open_loop_states(model: ManoeuvringModel, trial: Trial, starts: Floats) -> Floats:
+    """States along a trial from some first ones, by its measured commands alone.
+
+    From shape (n_starts, n_state) to (n_starts, n_samples, n_state); as `open_loop`.
+    """
+    t = np.array(trial.t)
+    delta = np.array(trial["delta"])
+    n = np.array(trial["n"]) if "n" in trial.channels else np.zeros(len(t))
+    wind = wind_accelerations(trial, model.dynamics)
+    mean_wind = 0.5 * (wind[1:] + wind[:-1])
+    numbers = model.ship_numbers()
+    loop = ship_loop(
+        model.compiled, "open_loop", OPEN_SEA if mean_wind.any() else STILL_WATER
+    )
+    found = np.zeros((len(starts), len(t), len(model.state_names)))
+    found[:, 0] = starts
+    longest_step = LONGEST_STEP * model.travel_time
+    for states in found:
+        reached = loop(states, t, delta, n, mean_wind, longest_step, numbers)
+        if reached < len(t) - 1:
+            raise unstable(model, t[reached], states[reached])
+    return found
+
+
+def first_state(model: ManoeuvringModel, trial: Trial) -> Floats:
     """State at a trial's first sample, by its channels; 0 for those it has not."""
     first = {}
     for name in ("psi", "u", "v", "r", "delta", *model.command_names[1:]):
