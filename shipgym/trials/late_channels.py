@@ -20,11 +20,10 @@ from shipgym.trials.units import DEGREE
 
 LONGEST_DELAY_S = 10.0  # that is looked for
 _CERTAIN = 6.0  # standard errors by which a channel must explain the other
-#: Name of a channel, what it is compared with, and the delay on one clock, s, less its
-#: error, that is refused.
+#: Name of a channel, and what it is compared with.
 _COMPARISONS = {
-    "r": ("the yaw rate", "the heading", 1.0),
-    "delta": ("the rudder", "the yaw acceleration", 1.5),
+    "r": ("the yaw rate", "the heading"),
+    "delta": ("the rudder", "the yaw acceleration"),
 }
 
 
@@ -34,11 +33,12 @@ class LateChannel(NamedTuple):
     channel: str
     delay: float  # s
     error: float  # standard error, ships of other dynamics included, s
+    refused: float  # delay on one clock, less its error, that is refused, s
 
     @property
     def evidence(self) -> str:
         """Delay found, in words."""
-        name, target, _ = _COMPARISONS[self.channel]
+        name, target = _COMPARISONS[self.channel]
         side = "late" if self.delay > 0.0 else "early"
         return (
             f"{name} is {abs(self.delay):.2f} s {side} against {target} (standard error"
@@ -70,8 +70,7 @@ def is_corrected(
     """
     if choice is not None or not is_one_clock:
         return choice != "keep"
-    _, _, refused_s = _COMPARISONS[late.channel]
-    if abs(late.delay) - late.error <= refused_s:
+    if abs(late.delay) - late.error <= late.refused:
         return False
     raise InputError(
         f"{where}: expected one clock, got one of which {late.evidence}; to have it"
@@ -89,7 +88,10 @@ def _suspects(log: Log) -> list[LateChannel]:
     if rate is not None and rate.certainty >= _CERTAIN:
         dynamics_s = 0.25
         error = math.hypot(rate.error, dynamics_s)
-        late.append(LateChannel("r", rate.late, error))
+        # some 3 % of the time constant of the ship
+        refused = max(1.0, _cycle_time(log.t, log.channels["r"]) / 150.0)
+        if abs(rate.late) >= 5.0 * error:
+            late.append(LateChannel("r", rate.late, error, refused))
 
     # where the yaw rate is the derivative of a heading with noise
     certain_derived = 10.0
@@ -101,7 +103,7 @@ def _suspects(log: Log) -> list[LateChannel]:
         # an early rudder looks like that of a ship which answers slowly
         cycles = 1.0 / 18.0 if rudder.late > 0.0 else 1.0 / 30.0
         if abs(rudder.late) <= min(cycles * cycle, 0.9 * LONGEST_DELAY_S):
-            late.append(LateChannel("delta", rudder.late, error))
+            late.append(LateChannel("delta", rudder.late, error, refused=1.5))
 
     significant = 2.5  # standard errors
     return [one for one in late if abs(one.delay) >= significant * one.error]
@@ -154,7 +156,11 @@ def _offsets(log: Log) -> dict[str, _Offset | None]:
     channels = log.channels
     found: dict[str, _Offset | None] = {}
     if log.has("psi", "r") and _reverses(channels["r"]):
-        found["r"] = _offset(t, channels["psi"], channels["r"], [])
+        r = channels["r"]
+        cycle = _cycle_time(t, r)
+        # as long as the signal lets them be, in which noise averages out
+        windows = _windows(t, max(0.25 * cycle, 5.0)) or _windows(t)
+        found["r"] = _offset(windows, channels["psi"], r, [], 0.5 * cycle)
     has_motion = log.has("psi") or log.has("r")
     least_swing = 2.0 * DEGREE
     if not (has_motion and log.has("delta")):
@@ -175,7 +181,8 @@ def _offsets(log: Log) -> dict[str, _Offset | None]:
     others = [r, r**3]
     for memory in (20.0, 80.0):
         others += [_remembered(t, r, memory), _remembered(t, delta, memory)]
-    found["delta"] = _offset(t, r, delta, others)
+    half_cycle = 0.5 * _cycle_time(t, delta)
+    found["delta"] = _offset(_windows(t), r, delta, others, half_cycle)
     return found
 
 
@@ -207,58 +214,91 @@ class _Windows(NamedTuple):
 
 
 def _offset(
-    t: Floats, target: Floats, late: Floats, others: Sequence[Floats]
+    windows: _Windows | None,
+    target: Floats,
+    late: Floats,
+    others: Sequence[Floats],
+    block: float,
 ) -> _Offset | None:
     """Delay of a channel against the change of a target; None where it cannot be found.
 
-    The target is differentiated over windows of time, s; the other channels explain its
-    change together with the late one. All have shape (n_samples,).
+    The target is differentiated over windows of time; the other channels explain its
+    change together with the late one. All have shape (n_samples,). Delays are tried in
+    whole sampling steps, at which windows average as much noise as without. The error
+    is that of blocks of time, s, drawn anew (Kuensch 1989, Ann. Statist. 17): what the
+    windows leave is correlated.
     """
-    windows = _windows(t)
     if windows is None:
         return None
     known = _known_directions(windows, others)
     change = _unexplained(windows.slope(target), known)
-    channel = integral(t, late)
-
-    def residual(delay: float) -> Floats:
-        regressor = _unexplained(windows.slope(channel, delay), known)
-        tiny = 1e-300  # in place of zero, by which is divided
-        gain = float(regressor @ change) / max(float(regressor @ regressor), tiny)
-        left: Floats = change - gain * regressor
-        return left
-
-    delays = np.arange(-LONGEST_DELAY_S, LONGEST_DELAY_S + 0.1, 0.25)
-    squares = np.array([float(np.sum(residual(delay) ** 2)) for delay in delays])
-    power = float(change @ change)
-    k = int(np.argmin(squares))
-    if k in (0, delays.size - 1):
-        return None
-    around = slice(k - 1, k + 2)
-    half_curvature, slope, _ = np.polyfit(
-        delays[around] - delays[k], squares[around], deg=2
+    channel = integral(windows.t, late)
+    delays = _delays(usual_step(windows.t))
+    regressors = [
+        _unexplained(windows.slope(channel, delay), known) for delay in delays
+    ]
+    tiny = 1e-300  # in place of zero, by which is divided
+    left = np.array(
+        [
+            change - (one @ change) / max(float(one @ one), tiny) * one
+            for one in regressors
+        ]
     )
-    curvature = 2.0 * float(half_curvature)
-    if curvature * float(delays[1] - delays[0]) ** 2 <= 1e-12 * power:
+    squares = left**2
+    total = squares.sum(axis=1)
+    late_s = _least_at(delays, total)
+    if late_s is None:
         return None
-
-    at = float(delays[k] - slope / curvature)
-    left = residual(at)
-    least = max(float(left @ left), 1e-300)
-    free = _independent_samples(left, least)
+    n_blocks = max(int((windows.centres[-1] - windows.centres[0]) / block), 2)
+    sums = [part.sum(axis=1) for part in np.array_split(squares, n_blocks, axis=1)]
+    power = float(change @ change)
+    least = max(float(total.min()), tiny)
+    free = _independent_samples(left[int(np.argmin(total))], least)
     return _Offset(
-        late=at,
-        error=math.sqrt(2.0 * least / free / curvature),
+        late=late_s,
+        error=_by_blocks(delays, np.array(sums)),
         certainty=math.sqrt(free * max(power / least - 1.0, 0.0)),
     )
 
 
-def _windows(t: Floats) -> _Windows | None:
-    """Windows one sample apart, inside the record for every delay.
+def _delays(step: float) -> Floats:
+    """Delays that are tried, s, in sampling steps."""
+    apart = max(round(0.25 / step), 1) * step
+    n = math.ceil(LONGEST_DELAY_S / apart)
+    return np.asarray(apart * np.arange(-n, n + 1), dtype=float)
+
+
+def _least_at(delays: Floats, squares: Floats) -> float | None:
+    """Delay of the least sum of squares by a parabola; None at an end."""
+    k = int(np.argmin(squares))
+    if k in (0, delays.size - 1):
+        return None
+    before, least, after = squares[k - 1 : k + 2]
+    curvature = before - 2.0 * least + after
+    if curvature <= 1e-12 * squares.max():
+        return None
+    part = 0.5 * (before - after) / curvature
+    return float(delays[k] + part * (delays[1] - delays[0]))
+
+
+def _by_blocks(delays: Floats, sums: Floats) -> float:
+    """Standard error of the delay by blocks drawn anew, shape (n_blocks, n_delays)."""
+    random = np.random.default_rng(0)
+    n_blocks = len(sums)
+    found = []
+    for _ in range(200):
+        drawn = sums[random.integers(0, n_blocks, n_blocks)].sum(axis=0)
+        k = int(np.argmin(drawn))
+        at = _least_at(delays, drawn)
+        found.append(float(delays[k]) if at is None else at)
+    return float(np.std(found)) * math.sqrt(n_blocks / (n_blocks - 1))
+
+
+def _windows(t: Floats, length: float = 5.0) -> _Windows | None:
+    """Windows of a length, s, one sample apart, inside the record for every delay.
 
     None where there are too few or too many.
     """
-    length = 5.0
     margin = LONGEST_DELAY_S + length
     first = t[0] + margin
     last = t[-1] - margin

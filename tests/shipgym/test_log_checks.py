@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from shipgym import InputError, ShipFile, Trial
+from shipgym import InputError, ShipFile, Trial, load_model, manoeuvres
 from tests.shipgym.one_zigzag import sailed
 
 NAN, DEGREE = math.nan, math.pi / 180.0
@@ -267,6 +267,25 @@ def test_a_noisy_compass_makes_no_rudder_late(tmp_path, noise_deg, step):
         columns = {"t": sound["t"], "psi": sound["psi"] + noise}
         path = written(tmp_path / "run.csv", **columns, delta=sound["delta"])
         assert len(Trial.from_csv(path)) == 800
+
+
+@pytest.mark.parametrize("noise_deg", [0.2, 1.0])
+def test_noise_makes_no_yaw_rate_of_a_slow_tanker_early(tmp_path, noise_deg):
+    """325 m long, one clock, a sample a second."""
+    tanker = load_model("tanker")
+    travel = tanker.travel_time
+    run = manoeuvres.zigzag(tanker, 20, 20, duration=30.0 * travel, dt=travel / 100.0)
+    t = np.arange(0.0, run.t[-1])
+    channels = {name: np.interp(t, run.t, run[name]) for name in ("psi", "r", "delta")}
+    for seed in range(4):
+        random = np.random.default_rng(seed)
+        noisy = dict(channels)
+        noisy["psi"] = channels["psi"] + noise_deg * DEGREE * random.normal(size=t.size)
+        noisy["r"] = channels["r"] + 0.1 * DEGREE * random.normal(size=t.size)
+        path = written(tmp_path / "run.csv", t=t, **noisy)
+        assert not any(
+            "early" in note or "late" in note for note in Trial.from_csv(path).notes
+        )
 
 
 # --- parts of a log
