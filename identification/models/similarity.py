@@ -165,8 +165,9 @@ def with_usual_hull(ship: Particulars) -> Particulars:
     """Particulars with absent beam, draught and block coefficient of a usual hull.
 
     A beam of L / 6.2, a draught of B / 2.7 and a block coefficient of 0.75 lie between
-    those of tankers and container ships; marked as estimated. Boats below 30 m differ
-    too much, and keep what is known.
+    those of tankers and container ships; marked as estimated. A mass that was given
+    leads to the block coefficient. Boats below 30 m differ too much, and keep what is
+    known.
     """
     shortest = 30.0
     if ship.length < shortest:
@@ -176,6 +177,15 @@ def with_usual_hull(ship: Particulars) -> Particulars:
         {
             "beam": lambda known: known.length / 6.2,
             "draught": lambda known: known.require("beam") / 2.7,
-            "block_coefficient": lambda known: 0.75,
+            "block_coefficient": _usual_block,
         },
     )
+
+
+def _usual_block(known: Particulars) -> float:
+    """Block coefficient by the mass where it is known, of ships as they are."""
+    if known.mass is None:
+        return 0.75
+    box = known.length * known.require("beam") * known.require("draught")
+    density = known.water_density or 1025.0
+    return min(max(known.mass / (density * box), 0.4), 0.9)

@@ -158,13 +158,17 @@ class Particulars(Mapping[str, Any]):
             number = check_value(name, value)
             numbers[name] = number
             object.__setattr__(self, name, number)
-        check_together(numbers)
 
         names = self.estimated
         listed = isinstance(names, list | tuple | set | frozenset)
         if not listed or not all(name in NAMES for name in names):
             raise unexpected("estimated", "a list of names of values", names)
         object.__setattr__(self, "estimated", frozenset(names))
+        # what was given is held against what was given alone
+        given = {
+            name: value for name, value in numbers.items() if name not in self.estimated
+        }
+        check_together({**given, "length": numbers["length"]})
 
     def __getitem__(self, name: str) -> Any:
         if name not in NAMES:

@@ -163,3 +163,13 @@ def test_what_no_ship_has_is_refused(values, message):
         Particulars.from_mapping(KVLCC2 | values, "ship.toml: [ship]")
     assert str(caught.value).startswith("ship.toml: [ship]")
     assert message in str(caught.value)
+
+
+def test_a_mass_is_not_held_against_a_block_coefficient_that_was_guessed():
+    slender = {"length": 100.0, "beam": 12.0, "draught": 4.0, "mass": 1.6e6}
+    guessed = Particulars(
+        **slender, block_coefficient=0.9, estimated={"block_coefficient"}
+    )
+    assert guessed.mass == 1.6e6
+    with pytest.raises(InputError, match="half to twice what block_coefficient gives"):
+        Particulars(**slender, block_coefficient=0.9)
