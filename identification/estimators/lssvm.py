@@ -199,6 +199,10 @@ class TruncatedLSSVM(LinearRegressor):
         )
         return self
 
+    def error_weight(self) -> float:
+        """Weight of the squared errors in the solution."""
+        return self.C
+
     def _fit(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
         problem = decompose(
             X,

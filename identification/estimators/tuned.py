@@ -136,6 +136,10 @@ class TunedLSSVM(LinearRegressor):
                 setattr(self, name, value)
         return self
 
+    def error_weight(self) -> float:
+        """Weight of the squared errors in the solution."""
+        return float(self.C_)
+
     def _log_bounds(self) -> tuple[float, float]:
         """Bounds of log10 C, checked."""
         try:

@@ -1,24 +1,32 @@
-"""Which fit predicts trials held out best: errors of each, and the choice."""
+"""Which fit predicts what was left out best: likelihood of each, and the choice.
+
+What a fit predicts of a trial that it did not know is compared with every channel that
+was measured, piece by piece. The likelihood of a piece is that of normal errors of a
+size of its own, at least the noise: a structure that is wrong misses the worst piece by
+so much that the others would not count otherwise. Errors are taken to be correlated
+over the time to sail one ship length.
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from dataclasses import asdict, dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 
 from identification.arrays import root_mean_square
 from identification.judging.extrapolation import largest_rudders
-from identification.samples.prediction import predict, predicts_track
+from identification.models.sailed import least_scales
+from identification.samples.prediction import predict
+from identification.samples.preprocess import noise_level
 from shipgym import ShipModel, Trial
-from shipgym.arrays import Integers
-from shipgym.ships.structures import GREY_BOX, MMG
+from shipgym.arrays import Floats, Integers
 from shipgym.trials.resampling import usual_step
 
 #: Of few coefficients, those with the bias of the rudder last; by the simulated motion
 #: of whole trials, in which a small bias shows, too.
 RESPONSES = ("nomoto", "norrbin", "nomoto-bias", "norrbin-bias")
-#: Methods that a table that predicts best is also fitted by; quick ones.
-OTHERS = ("ls", "cv-lssvr")
+#: Ship lengths of a piece of a trial at least.
+PIECE = 5.0
 
 #: Metrics of trials by their names, see `prediction.trial_metrics`.
 Metrics = Mapping[str, Mapping[str, Any]]
@@ -49,28 +57,33 @@ class Fitted(Protocol):
 
 @dataclass(frozen=True)
 class RankedFit:
-    """Errors of a method on the trials held out."""
+    """How well a structure and a method predict what was left out."""
 
     structure: str  # of its model
     method: str  # its name
     coefficients: int  # their number
-    stable: bool  # whether its model passed the guard
-    ran_away: int  # trials held out on which its simulation ran away
-    #: root mean square error of the simulated u, v, r and psi by the standard deviation
-    #: of what was measured, mean over channels and trials: 0 for perfect, 1 for no
-    #: better than a constant. None where one ran away
-    error: float | None
+    stable: bool  # whether its model passed the guard, a hard turn among it
+    ran_away: int  # predictions of trials left out that ran away
+    #: logarithm of the likelihood of errors of the size of the noise over that of its
+    #: own, mean over channels and pieces, for each ship length: 0 for perfect
+    loss: float
     #: root mean square error, mean over the trials on which it did not run away
     heading_deg: float | None
     yaw_rate_deg_s: float | None
-    errors: dict[str, float | None]  # `error` of each trial
-    #: whether it explains half of the variance of the speed in trials held out
-    predicts_speed: bool = False
+    scales: dict[str, float]  # errors by the noise, median of the pieces, by channel
+    losses: dict[str, float]  # mean of each trial
+    of_pieces: tuple[float, ...] = field(repr=False)  # losses
 
     @property
-    def rank(self) -> tuple[Any, ...]:
-        """Sort key: first those that never run away, then by the error."""
-        return self.ran_away, not self.stable, self.error is None, self.error or 0.0
+    def rank(self) -> tuple[bool, float]:
+        """Sort key: first those that are stable, then by the loss."""
+        return not self.stable, self.loss
+
+    def plain(self) -> dict[str, Any]:
+        """The fit for the provenance."""
+        told = asdict(self)
+        del told["of_pieces"]
+        return told
 
 
 def fit_name(structure: str, method: str) -> str:
@@ -78,93 +91,46 @@ def fit_name(structure: str, method: str) -> str:
     return f"{structure} by {method}"
 
 
-def shown_to_turn(ranked: Sequence[RankedFit]) -> list[RankedFit]:
-    """The fits that are known to turn where no trial does; all where none is.
-
-    Those of few parameters, and those that a prior, formulas or a reference ship hold
-    in a hard turn. The terms of a table that zigzags fix are not known beyond them.
-    """
-    known = []
-    for fit in ranked:
-        turns = fit.structure in (*RESPONSES, GREY_BOX, MMG)
-        if turns and not fit.ran_away:
-            known.append(fit)
-    return known or list(ranked)
-
-
-def what_turns(taken: RankedFit, by_error: RankedFit) -> dict[str, Any]:
-    """What holds a hard turn of the fit that is taken, where no trial turns.
-
-    `by_error`: the fit that would be taken by its error alone.
-    """
-    shown_by = "nothing"
-    if taken.structure in RESPONSES:
-        shown_by = "its few parameters"
-    elif taken.structure in (GREY_BOX, MMG):
-        shown_by = "its prior"
-    passed_over = None
-    if by_error is not taken:
-        passed_over = fit_name(by_error.structure, by_error.method)
-    return {"shown_by": shown_by, "predicts_better": passed_over}
-
-
-class HeldOut(NamedTuple):
-    """Errors of the prediction of a trial held out."""
-
-    #: of the heading, by its standard deviation; without one, of the yaw rate; in wind
-    #: that of `_turning_error`
-    relative: float
-    heading: float  # root mean square, rad
-    yaw_rate: float  # rad/s
-    speed: float  # of the surge speed, by its standard deviation
-
-
-def rank_by_turns(structure: str, method: str, fit: Fitted) -> RankedFit:
-    """Rank of a fit, by what it predicts of its own trials, each held out in turn."""
+def rank_by_likelihood(structure: str, method: str, fit: Fitted) -> RankedFit:
+    """Rank of a fit, by what it predicts of its own trials, each left out in turn."""
     trials = fit.problem.used
-    seen: dict[str, list[HeldOut | None]] = {trial.name: [] for trial in trials}
+    runs = list[tuple[Trial, Trial | None]]()
     for group in _groups(trials):
         model = fit.without(group.tolist())
-        for place in group:
-            trial = trials[place]
-            seen[trial.name].append(_held_out(model, trial))
+        runs += [(trials[place], predict(model, trials[place])) for place in group]
 
-    every = [error for errors in seen.values() for error in errors]
-    ran_away = [error for error in every if error is None]
-    known = [error for error in every if error is not None]
-    errors = {name: _mean_error(found) for name, found in seen.items()}
-    mean_error = None
-    heading = None
-    yaw_rate = None
-    if known:
-        heading = float(np.degrees(np.mean([error.heading for error in known])))
-        yaw_rate = float(np.degrees(np.mean([error.yaw_rate for error in known])))
-    if known and not ran_away:
-        mean_error = float(np.mean(list(errors.values())))
+    windy = in_wind(trials)
+    losses: dict[str, list[float]] = {trial.name: [] for trial in trials}
+    sizes = list[dict[str, float]]()
+    for trial, run in runs:
+        errors = Errors(fit.model, trial, windy)
+        for piece in errors.pieces():
+            found = errors.sizes(run, piece)
+            losses[trial.name].append(float(np.mean(np.log(list(found.values())))))
+            sizes.append(found)
+    of_pieces = [loss for found in losses.values() for loss in found]
+    known = [(trial, run) for trial, run in runs if run is not None]
+    scales = {
+        name: float(np.median([one[name] for one in sizes if name in one]))
+        for name in dict.fromkeys(name for one in sizes for name in one)
+    }
     return RankedFit(
         structure=structure,
         method=method,
         coefficients=fit.free_coefficients,
         stable=fit.stable,
-        ran_away=len(ran_away),
-        error=mean_error,
-        heading_deg=heading,
-        yaw_rate_deg_s=yaw_rate,
-        errors=errors,
-        predicts_speed=_predicts_speed(fit.model, known),
+        ran_away=len(runs) - len(known),
+        loss=float(np.mean(of_pieces)),
+        heading_deg=_mean_error_deg("psi", known),
+        yaw_rate_deg_s=_mean_error_deg("r", known),
+        scales=scales,
+        losses={name: float(np.mean(found)) for name, found in losses.items()},
+        of_pieces=tuple(of_pieces),
     )
 
 
-def _predicts_speed(model: ShipModel, known: Sequence[HeldOut]) -> bool:
-    """Whether the speed in trials held out is better predicted than by a constant."""
-    if not known or not predicts_track(model):
-        return False
-    most = np.sqrt(0.5)
-    return bool(np.mean([error.speed for error in known]) < most)
-
-
 def _groups(trials: Sequence[Trial]) -> list[Integers]:
-    """Places of the trials that are held out together: each, and the largest rudders.
+    """Places of the trials that are left out together: each, and the largest rudders.
 
     These are what a hard turn is to trials of less rudder.
     """
@@ -175,26 +141,14 @@ def _groups(trials: Sequence[Trial]) -> list[Integers]:
     return groups
 
 
-def _held_out(model: ShipModel, trial: Trial) -> HeldOut | None:
-    """Errors of the prediction of a trial; None where the model runs away."""
-    run = predict(model, trial)
-    if run is None:
-        return None
-    errors = {}
-    relative = {}
-    for name in ("psi", "r", "u"):
-        if name in trial:
-            errors[name] = root_mean_square(run[name] - trial[name])
-            relative[name] = errors[name] / max(float(np.std(trial[name])), 1e-12)
-    error = next(iter(relative.values()))
-    if "psi" in trial and in_wind([trial]):
-        error = _turning_error(model, run, trial)
-    return HeldOut(
-        relative=error,
-        heading=errors.get("psi", np.nan),
-        yaw_rate=errors["r"],
-        speed=relative.get("u", np.inf),
-    )
+def _mean_error_deg(name: str, runs: Sequence[tuple[Trial, Trial]]) -> float | None:
+    """Error of a channel in deg, mean over the trials that have it."""
+    errors = [
+        root_mean_square(run[name] - trial[name])
+        for trial, run in runs
+        if name in trial
+    ]
+    return float(np.degrees(np.mean(errors))) if errors else None
 
 
 def in_wind(trials: Sequence[Trial]) -> bool:
@@ -202,80 +156,80 @@ def in_wind(trials: Sequence[Trial]) -> bool:
     return any("wind_rdot" in trial for trial in trials)
 
 
-def _turning_error(model: ShipModel, run: Trial, trial: Trial) -> float:
-    """Error of a prediction in how far the ship turns in one ship length, relative.
+class Errors:
+    """Errors of predictions of a trial by their noise.
 
-    Root mean squares. What is left of the moment of the wind makes the heading of a
-    gentle zigzag drift, and hardly matters in a turn.
+    Compared are position, speed, heading and yaw rate, as far as they were measured: a
+    yaw rate that is the derivative of the heading says nothing new. What a structure
+    has no equation of stays as it began, and its whole change is an error.
+
+    What is left of the moment of the wind makes heading and track of a gentle zigzag
+    drift, and hardly matters in a turn: in wind the heading is compared by how far the
+    ship turns in one ship length, and the position not at all.
     """
-    steps = model.travel_time / usual_step(trial.t)
-    lag = min(max(round(steps), 1), len(trial) - 1)
-    heading = trial["psi"]
-    turned = heading[lag:] - heading[:-lag]
-    error = run["psi"] - heading
-    change = error[lag:] - error[:-lag]
-    return root_mean_square(change) / max(root_mean_square(turned), 1e-12)
+
+    def __init__(self, model: ShipModel, trial: Trial, windy: bool) -> None:
+        self.trial = trial
+        self.steps = max(round(model.travel_time / usual_step(trial.t)), 1)
+        measured = trial.channels.keys() - trial.derived
+        names = [name for name in ("psi", "r", "u") if name in trial]
+        if "r" in trial.derived and "psi" in names:
+            names.remove("r")
+        if {"x", "y"} <= measured and not windy:
+            names += ["x", "y"]
+        self.lag = min(self.steps, len(trial) - 1) if windy else 0
+        length = model.particulars["length"]
+        least = dict(zip("uvr", least_scales(model, "uvr"), strict=True))
+        least |= {"psi": np.radians(0.1), "x": 0.01 * length, "y": 0.01 * length}
+        self.noises = {
+            name: max(noise_level(trial.t, trial[name]), least[name]) for name in names
+        }
+
+    def pieces(self) -> list[slice]:
+        """Samples of pieces of the trial of some ship lengths."""
+        n_pieces = max(int(len(self.trial) / (PIECE * self.steps)), 1)
+        edges = np.linspace(0, len(self.trial), n_pieces + 1).astype(int)
+        return [slice(*edges[k : k + 2]) for k in range(n_pieces)]
+
+    def sizes(self, run: Trial | None, piece: slice) -> dict[str, float]:
+        """Root mean square errors in a piece by their noise, at least 1, by channel.
+
+        A prediction that ran away is ten times as wrong as no change at all.
+        """
+        found = {}
+        for name, noise in self.noises.items():
+            values = self.trial[name]
+            if run is None:
+                error = 10.0 * max(float(np.std(values)), noise)
+            else:
+                error = root_mean_square(self._error(name, run[name] - values, piece))
+            found[name] = max(error / noise, 1.0)
+        return found
+
+    def _error(self, name: str, error: Floats, piece: slice) -> Floats:
+        if name != "psi" or not self.lag:
+            return error[piece]
+        change = error[self.lag :] - error[: -self.lag]
+        within = change[piece]
+        return within if len(within) else change
 
 
-def _mean_error(found: Sequence[HeldOut | None]) -> float | None:
-    """Mean relative error of a trial; None where a model ran away on it."""
-    known = [error.relative for error in found if error is not None]
-    if len(known) < len(found):
-        return None
-    return float(np.mean(known))
+def simplest(ranked: Sequence[RankedFit]) -> RankedFit:
+    """The fit of fewest coefficients whose loss differs from the first's by chance.
 
-
-def simplest(ranked: Sequence[RankedFit], in_wind: bool = False) -> RankedFit:
-    """The fit of fewest coefficients whose errors differ from the first's by chance.
-
-    Of those with no larger error than it has, one that predicts the speed, too. In wind
-    no other is taken while there is one: the speed changes with the course, and with it
-    how the ship turns.
+    By one standard error of their difference, piece by piece. 0.02 are nothing. None of
+    those that are not stable while another is.
     """
-    if in_wind:
-        with_speed = [fit for fit in ranked if fit.predicts_speed]
-        ranked = with_speed or ranked
     first = ranked[0]
-    if first.error is None:
-        return first
-    as_good = []
-    for fit in ranked:
-        sails = fit.stable and not fit.ran_away
-        if sails and _differs_by_chance(fit, first):
-            as_good.append(fit)
-    if not as_good:
-        return first
-
-    fewest = min(as_good, key=_coefficients)
-    most = fewest.error or 0.0
-    with_speed = []
-    for fit in as_good:
-        if fit.predicts_speed and (fit.error or 0.0) <= most:
-            with_speed.append(fit)
-    return min(with_speed, key=_coefficients, default=fewest)
-
-
-def _coefficients(fit: RankedFit) -> tuple[int, bool]:
-    """Number of coefficients, of methods of one structure the usual first."""
-    return fit.coefficients, fit.method in OTHERS
+    as_good = [fit for fit in ranked if _differs_by_chance(fit, first)]
+    return min(as_good, key=lambda fit: (fit.coefficients, fit.loss), default=first)
 
 
 def _differs_by_chance(fit: RankedFit, first: RankedFit) -> bool:
-    """Tell whether errors exceed the first's by no more than chance.
-
-    By one standard error of the difference, but no more than a quarter of the first's:
-    of few trials a single one that goes wrong makes that error large. 2 % are nothing.
-    """
-    differences = []
-    for name, error in first.errors.items():
-        own = fit.errors[name] or 0.0
-        difference = own - (error or 0.0)
-        differences.append(difference)
-    n_trials = len(differences)
-    excess = np.mean(differences)
-    deviation = float(np.std(differences, ddof=1))
-    standard_error = deviation / np.sqrt(n_trials)
-    least = first.error or 0.0
-    by_chance = min(standard_error, 0.25 * least)
-    nothing = 0.02 * least
-    return bool(excess <= max(by_chance, nothing))
+    """Tell whether a loss exceeds the first's by no more than chance."""
+    if fit.stable != first.stable:
+        return False
+    differences = np.subtract(fit.of_pieces, first.of_pieces)
+    by_chance = float(np.std(differences)) / np.sqrt(max(len(differences) - 1, 1))
+    nothing = 0.02
+    return bool(np.mean(differences) <= max(by_chance, nothing))

@@ -49,14 +49,6 @@ def turn_sentences(provenance: Mapping[str, Any]) -> list[str]:
             f" to be known to {percent:.0f} % (standard error; {error['how']}). A turn"
             " at full rudder would show it."
         )
-    choice = provenance.get("selection", {}).get("turns", {})
-    passed_over = choice.get("predicts_better")
-    if passed_over:
-        sentences.append(
-            f"The structure was taken for {choice['shown_by']}, known to turn:"
-            f" {passed_over} predicts the trials held out better, but nothing shows"
-            " that it turns."
-        )
     return sentences
 
 

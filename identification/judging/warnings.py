@@ -46,6 +46,7 @@ def model_warnings(fit: Fit) -> list[str]:
         *_guarded(provenance),
         *_not_corrected(fit),
         *_not_refined(provenance),
+        *_wrong_structure(provenance),
         *_shaft_ignored(fit),
         *provenance.get("sea_remarks", []),
         *provenance.get("prior_remarks", []),
@@ -205,6 +206,19 @@ def _not_corrected(fit: Fit) -> list[str]:
         f"the model is the bare reference ship {reference['name']!r}{like}: no"
         " correction predicted the held-out trials better, so C = 0; name another"
         " reference_model, add trials, or choose another structure"
+    ]
+
+
+def _wrong_structure(provenance: Mapping[str, Any]) -> list[str]:
+    """A structure whose errors are several times what its covariance explains."""
+    factor = provenance.get("model_error", {}).get("factor", 1.0)
+    most = 3.0
+    if factor <= most or "selection" not in provenance:
+        return []
+    return [
+        f"the best structure is wrong, too: its errors are {factor:.2g} times"
+        " what noise and the uncertainty of its coefficients explain; intervals are"
+        " widened by that, and hold less beyond the trials"
     ]
 
 

@@ -23,6 +23,10 @@ DURATION_LENGTHS = 50.0  # of a trial manoeuvre, at service speed
 STEP = 0.02  # of the time to sail one ship length
 
 
+#: The ridge regression that takes the place of a method whose model runs away.
+HELD = "hard-turn-ridge"
+
+
 class Simulation(NamedTuple):
     """A simulation that a model has to survive."""
 
@@ -147,9 +151,14 @@ class GuardedFit:
     model: ShipModel  # with the identified coefficients
     estimators: Estimators
     stable: bool  # whether the model passed the guard
-    #: for the provenance: `decision`, `strength` of the penalty, and why the fit
-    #: without it was rejected
+    #: for the provenance: `decision`, `strength` of the penalty, the method that it
+    #: came `in_place_of`, and why the fit without it was rejected
     report: dict[str, Any]
+
+    @property
+    def held_by(self) -> str | None:
+        """The method that took the place of the one asked for; None where none did."""
+        return HELD if "in_place_of" in self.report else None
 
 
 def guarded_fit(method: Method, task: FitTask, guarded: bool = True) -> GuardedFit:
@@ -171,7 +180,7 @@ def guarded_fit(method: Method, task: FitTask, guarded: bool = True) -> GuardedF
 
     decision = "runs away, not guarded"
     if guarded and method.regularised:
-        penalised = penalised_fit(task, reasons)
+        penalised = penalised_fit(method.name, estimators, task, reasons)
         if penalised is not None:
             return penalised
         decision = "runs away under every penalty"
@@ -183,11 +192,14 @@ def guarded_fit(method: Method, task: FitTask, guarded: bool = True) -> GuardedF
     )
 
 
-def penalised_fit(task: FitTask, reasons: list[str]) -> GuardedFit | None:
+def penalised_fit(
+    name: str, fitted: Estimators, task: FitTask, reasons: list[str]
+) -> GuardedFit | None:
     """The fit with the weakest penalty on hard turns under which it does not run away.
 
-    `reasons`: why it did without. Strengths are rms errors allowed in the regression,
-    relative to what the terms contribute in a hard turn.
+    `name`: of the method whose estimators were `fitted` before, and keep their own
+    penalty; `reasons`: why these run away. Strengths are rms errors allowed in the
+    regression, relative to what the terms contribute in a hard turn.
     """
     blank = task.blank
     sizes = hard_turn_features(
@@ -196,12 +208,13 @@ def penalised_fit(task: FitTask, reasons: list[str]) -> GuardedFit | None:
         blank.service_shaft_speed,
     )
     for strength in np.geomspace(1e-3, 1.0, 19).tolist():
-        estimators = fit_held(task.samples, sizes, strength)
+        estimators = fit_held(fitted, task.samples, sizes, strength)
         model = with_coefficients(blank, estimators)
         if not reasons_unstable(model, task.trials):
             report = {
                 "decision": "penalised by hard turn",
                 "strength": strength,
+                "in_place_of": name,
                 "rejected": reasons,
             }
             return GuardedFit(model, estimators, stable=True, report=report)

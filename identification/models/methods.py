@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 from sklearn.base import clone
 
+from identification.arrays import column_rms
 from identification.estimators.adapted import Adapted
 from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.linear import LinearRegressor
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
+from identification.estimators.tuned import TunedLSSVM
 from identification.models.refinement import Refinement
 from identification.samples.samples import Samples
 from shipgym import InputError
@@ -114,27 +116,42 @@ def get_method(method: str | Any) -> Method:
     )
 
 
-def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Estimators:
+def fit_held(
+    fitted: Estimators, samples: Samples, sizes: dict[str, Floats], strength: float
+) -> Estimators:
     """Estimators whose terms are held back by what they do in a hard turn.
 
     Ridge regression in which each feature is scaled by its size in a hard turn
     (`hard_turn.hard_turn_features`) over a window: the penalty falls on what is
     invisible in the data and large in the turn. Its strength is relative to the terms'
-    contribution there.
+    contribution there. To it comes the penalty of the estimators that were `fitted`
+    without it, which is the least.
     """
     mean_duration = np.mean(samples.duration)
     window = float(mean_duration)
     penalty = len(samples) * strength**2
-    C = 1.0 / penalty
     estimators: Estimators = {}
     for q, X, y in samples.by_equation():
+        by_turn = penalty * (sizes[q] * window) ** 2
         ridge = LSSVM(
-            C=C,
-            scale=sizes[q] * window,
+            C=1.0,
+            scale=np.sqrt(by_turn + own_penalty(fitted[q], X)),
             fit_intercept=False,
         )
         estimators[q] = ridge.fit(X, y)
     return estimators
+
+
+def own_penalty(estimator: Any, X: Floats) -> Floats | float:
+    """Penalty of each squared coefficient that a fitted LS-SVM has; 0 for others."""
+    if not isinstance(estimator, LSSVM | TruncatedLSSVM | TunedLSSVM):
+        return 0.0
+    scale = np.asarray(estimator.scale, dtype=float)
+    if estimator.scale is True:
+        scale = column_rms(X)
+    elif estimator.scale is False:
+        scale = np.ones(X.shape[1])
+    return np.asarray(scale**2 / estimator.error_weight())
 
 
 def without_constant(estimator: Any) -> Estimator:

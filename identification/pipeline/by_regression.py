@@ -97,7 +97,7 @@ class RegressionFit:
         `sea`: what is known of current and wind, where it was taken out before.
         """
         problem = replace(self.problem, sea={**self.problem.sea, **(sea or {})})
-        provenance = provenance_of(options, self.method.name, self.fit, problem)
+        provenance = provenance_of(options, self._made_by, self.fit, problem)
         if self.refined is not None:
             provenance["refinement"] = self.refined.report
         if options.uncertainty.by_sampling:
@@ -111,6 +111,14 @@ class RegressionFit:
             self.without,
             self._by_clock(),
         )
+
+    @property
+    def _made_by(self) -> str:
+        """Name of the method that made the numbers: the start's, where that stayed."""
+        refinement = self.method.refinement
+        if refinement is None or (self.refined and self.refined.covariance is not None):
+            return self.method.name
+        return get_method(refinement.start).name
 
     def _by_clock(self) -> Floats | float:
         """Change of the coefficients where the rudder is late by what a step hides.

@@ -1,24 +1,19 @@
 """Structures and methods tried on the same trials, for `structure = "auto"`."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, Protocol
 
-from identification.judging.extrapolation import holds_turn
 from identification.judging.rudder_bias import with_bias
 from identification.judging.selection import (
-    OTHERS,
     RESPONSES,
     Fitted,
     RankedFit,
     fit_name,
-    in_wind,
-    rank_by_turns,
-    shown_to_turn,
+    rank_by_likelihood,
     simplest,
-    what_turns,
 )
-from identification.models.refinement import whole_trials
+from identification.models.refinement import Refinement, whole_trials
 from identification.models.similarity import AUTO, with_usual_hull
 from identification.pipeline.options import MAP, Options, name_of
 from identification.pipeline.result import IdentificationResult
@@ -39,6 +34,8 @@ TABLES = (
 )
 STRUCTURES = (*TABLES, GREY_BOX, MMG)
 RM_SVM = "rm-svm"
+#: Tables that are fitted by output error, too, where they predict best by regression.
+REFINED = ("linear-steering", "steering7", "abkowitz", "cubic")
 
 
 class Candidate(Fitted, Protocol):
@@ -67,16 +64,17 @@ def select(
     trials: Sequence[Trial],
     options: Options,
 ) -> Choice:
-    """The structure and method that predict the heading of trials held out best.
+    """The structure and method that predict trials left out best.
 
-    Every structure that trials and particulars allow is fitted by its usual method,
-    those of few coefficients by output error too, a table that comes first by others,
-    and each trial (each third of a single one) predicted by fits without it; those of
-    the largest rudder also by fits to the trials of less rudder. The choice is the one
-    with the fewest coefficients whose error exceeds the least by no more than one
-    standard error of their difference over the trials (a quarter at most), or by 2 %. A
-    method other than the default is the only one, and what does not know a setting is
-    refused; InputError where nothing can be fitted, with the first reason.
+    Every structure that trials and particulars allow is fitted by its usual method, the
+    table that comes first by output error too, and each trial (each third of a single
+    one) predicted by fits without it; those of the largest rudder also by fits to the
+    trials of less rudder. Candidates are compared by the likelihood of all channels
+    that were measured (`judging.selection`). Those that run away in a hard turn are
+    last. The choice is the one with the fewest coefficients within one standard error
+    of the paired difference from the best. A method other than the default is the only
+    one, and what does not know a setting is refused; InputError where nothing can be
+    fitted, with the first reason.
     """
     to_fit = [trial for trial in trials if trial.use == "fit"]
     parts = list(trials)
@@ -89,19 +87,12 @@ def select(
     attempts.add_all()
 
     ranked = attempts.by_rank()
-    windy = in_wind(parts)
-    best = simplest(ranked, windy)
-    turns: dict[str, Any] = {"shown_by": "a trial that turns"}
-    if not holds_turn(to_fit):
-        by_error = best
-        best = simplest(shown_to_turn(ranked), windy)
-        turns = what_turns(best, by_error)
+    best = simplest(ranked)
     others = [other for other in ranked if other is not best]
     report = {
         "held_out": held_out,
-        "ranking": [asdict(one) for one in (best, *others)],
+        "ranking": [one.plain() for one in (best, *others)],
         "refused": attempts.refused,
-        "turns": turns,
     }
     own, whole = attempts.fits[fit_name(best.structure, best.method)]
     if single:
@@ -160,21 +151,17 @@ class _Attempts:
         """
         free = self.options.method_is_default
         for structure in counted("structures", STRUCTURES):
-            if not free:
-                self.add(structure, self.options.method)
-                continue
-            usual = RM_SVM if structure == GREY_BOX else self.options.method
-            self.add(structure, usual)
-            if structure in RESPONSES:
-                self.add(structure, whole_trials())
+            method = self.options.method
+            if free:
+                method = _usual_method(structure, method)
+            self.add(structure, method)
         if not self.ranked:
             first_reason = next(iter(self.refused.values()))
             raise InputError(first_reason)
 
-        best, *_ = self.by_rank()
-        if free and best.structure in TABLES and best.structure not in RESPONSES:
-            for method in OTHERS:
-                self.add(best.structure, method)
+        best = next((one for one in self.by_rank() if one.structure in REFINED), None)
+        if free and best is not None:
+            self.add(best.structure, Refinement())
 
     def add(self, structure: str, method: Any) -> None:
         """Try a structure and a method, or remember why it cannot be fitted."""
@@ -192,7 +179,7 @@ class _Attempts:
         name = fit_name(structure, by)
         try:
             found = self.fit(self.trials, own)
-            self.ranked.append(rank_by_turns(structure, by, found))
+            self.ranked.append(rank_by_likelihood(structure, by, found))
         except InputError as error:
             self.refused[name] = str(error)
         else:
@@ -201,6 +188,13 @@ class _Attempts:
     def by_rank(self) -> list[RankedFit]:
         """The fits, the best first."""
         return sorted(self.ranked, key=lambda fit: fit.rank)
+
+
+def _usual_method(structure: str, method: Any) -> Any:
+    """The method that a structure is fitted by, where none is named."""
+    if structure in RESPONSES:
+        return whole_trials()
+    return RM_SVM if structure == GREY_BOX else method
 
 
 def _of_usual_hull(given: Particulars | Mapping[str, Any]) -> Particulars:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,6 +36,7 @@ from identification.samples.problem import Problem
 from identification.samples.samples import Samples
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
+from shipgym.manoeuvres.measured import measured_indices
 from shipgym.ships import GreyBox
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def provenance_of(
 
     return {
         "structure": name_of(options.structure),
-        "method": method,
+        "method": method if fit.held_by is None else fit.held_by,
         "samples": options.samples.rule,
         "settings": provenance_settings(options),
         **further,
@@ -250,6 +251,12 @@ def evaluated(
     lost = [name for name, predicted in predictions.items() if predicted is None]
 
     complete = {**provenance, **problem.sea}
+    measured = {trial.name: measured_indices(model, trial) for trial in problem.used}
+    complete["measured"] = {
+        name: {index: asdict(value) for index, value in indices.items()}
+        for name, indices in measured.items()
+        if indices
+    }
     complete["steering"] = "estimated" if options.steering is None else "given"
     if lost:
         complete |= {"stable": False, "runs_away_on": lost}

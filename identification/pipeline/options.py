@@ -19,12 +19,13 @@ from identification.samples.still_water import check_current, check_wind
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.checks import check_choice, check_flag, check_number, check_text
 from shipgym.ships import Structure
-from shipgym.ships.structures import MMG
+from shipgym.ships.structures import GREY_BOX, MMG
 
 Given = Particulars | Mapping[str, Any] | None  # particulars, as `identify` takes them
 DEFAULT_METHOD = "tls-svm"
 MAP = "map"  # the method of the MMG form: maximum a posteriori
 AUTO = "auto"  # the structure that is chosen by trials held out
+BLACK_BOX = "linear"  # the structure beneath a kernel where none is named
 
 #: Stages of an identification that are one object each.
 STAGES: dict[str, type] = {
@@ -45,9 +46,10 @@ class Options:
 
     Parameters
     ----------
-    structure : str or Structure
+    structure : str, Structure or None
         Terms of the model: a name of `shipgym.list_structures`, a table, or "auto": the
-        structure and method that predict held-out trials best.
+        structure and method that predict held-out trials best. None is "abkowitz";
+        beneath a kernel it is "linear", or "grey-box" where a reference model is given.
     method : str or estimator
         How the coefficients are fitted: a name of
         `identification.models.methods.METHODS`, such as "tls-svm", an estimator
@@ -97,7 +99,7 @@ class Options:
         Shaft speed at service speed, 1/s; by default that at the start of the trials.
     """
 
-    structure: str | Structure = "abkowitz"
+    structure: str | Structure | None = None
     method: Any = DEFAULT_METHOD
     samples: Any = "spline"  # a Sampling once made, and so with the other stages
     particulars: Given = None
@@ -127,8 +129,16 @@ class Options:
                 "steering: expected a SteeringGear, or None to estimate it from the"
                 f" rudders, got {self.steering!r}"
             )
+        if self.structure is None:
+            object.__setattr__(self, "structure", self._unnamed_structure())
         if not isinstance(self.structure, Structure):
             check_text(self.structure, "structure")
+        if self.kernel is not None and self.structure == AUTO:
+            raise InputError(
+                "kernel: expected a structure beneath it that is named, got 'auto';"
+                " choose 'linear', another such as 'mmg', or 'grey-box' with a"
+                " reference_model"
+            )
         if not isinstance(self.reference_model, ShipModel | None):
             check_text(self.reference_model, "reference_model")
         check_current(self.current)
@@ -146,6 +156,12 @@ class Options:
         speed = self.service_shaft_speed
         if speed is not None:
             check_number(speed, "service_shaft_speed", above=0.0, hint="1/s")
+
+    def _unnamed_structure(self) -> str:
+        """The structure where none is named."""
+        if self.kernel is None:
+            return "abkowitz"
+        return BLACK_BOX if self.reference_model is None else GREY_BOX
 
     @property
     def method_is_default(self) -> bool:

@@ -167,8 +167,8 @@ def _table(
             " choose structure 'grey-box' (to pull coefficients to a ship's, give"
             " prior)"
         )
-    if isinstance(structure, str):
-        structure = get_structure(structure)
+    if not isinstance(structure, Structure):
+        structure = get_structure(str(structure))
     return structure, {}
 
 

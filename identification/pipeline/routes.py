@@ -34,7 +34,14 @@ from identification.pipeline.evaluation import (
     provenance_of,
     with_uncertainty,
 )
-from identification.pipeline.options import AUTO, MAP, Options, name_of, whole_call
+from identification.pipeline.options import (
+    AUTO,
+    BLACK_BOX,
+    MAP,
+    Options,
+    name_of,
+    whole_call,
+)
 from identification.pipeline.pose import pose
 from identification.pipeline.result import IdentificationResult
 from identification.samples.preprocess import smoothed_channels
@@ -43,11 +50,8 @@ from identification.samples.still_water import in_still_water
 from shipgym import InputError, ShipModel, Trial
 from shipgym.checks import quoted
 from shipgym.models.catalogue import fitted_box
-from shipgym.ships import GreyBox
+from shipgym.ships import GreyBox, Structure
 from shipgym.ships.structures import GREY_BOX, MMG
-
-#: The structure beneath a kernel where none is named.
-BLACK_BOX = "linear"
 
 
 def identified(trials: Sequence[Trial], options: Options) -> IdentificationResult:
@@ -109,6 +113,7 @@ def by_kernel(
         )
     beneath = reference_options(options)
     problem = pose(trials, beneath)
+    _check_beneath(problem.table)
     reference, box = _reference_box(trials, beneath, problem)
     smoothing = options.preprocessing.smoothing
     found = fit_kernel(
@@ -131,6 +136,18 @@ def by_kernel(
     provenance = provenance_of(named, name_of(options.method), fit, problem)
     provenance["kernel"] = found.report
     return with_uncertainty(fit, None, problem, provenance, options)
+
+
+def _check_beneath(table: Structure) -> None:
+    """Refuse a structure that cannot take a kernel."""
+    equations = set(table.equations)
+    if equations != set("uvr"):
+        listed = ", ".join(table.equations)
+        raise InputError(
+            "kernel: expected a structure beneath it with equations of u, v and r, got"
+            f" {table.name!r} with those of {listed}; choose 'linear' or 'abkowitz',"
+            " or leave the kernel out"
+        )
 
 
 def _reference_box(
@@ -167,12 +184,13 @@ def reference_options(options: Options) -> Options:
             " LS-SVM only, got an RMSVM with settings; leave them out"
         )
 
-    structure = options.structure
-    if structure in (Options.structure, AUTO):  # none was named
-        structure = BLACK_BOX if options.reference_model is None else GREY_BOX
-    if structure != GREY_BOX and name_of(method) == RMSVM.name:
-        method = "ls-svm"
-    return replace(options, structure=structure, method=method, kernel=None)
+    if options.structure != GREY_BOX and name_of(method) == RMSVM.name:
+        raise InputError(
+            "method: expected 'rm-svm' with structure 'grey-box', whose correction it"
+            f" fits, got structure {name_of(options.structure)!r}; leave the method"
+            " out: the kernel is fitted by LS-SVM"
+        )
+    return replace(options, kernel=None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,9 +4,10 @@ import re
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
-from identification import IdentificationResult, identify
+from identification import LSSVM, IdentificationResult, identify
 from identification.models.guard import (
     reasons_unstable,
 )
@@ -59,6 +60,25 @@ def test_a_fit_that_runs_away_is_held_and_says_so(
     assert held.model.provenance["guard"]["strength"] > 0.0
     assert held.model.provenance["guard"]["rejected"]
     assert reasons_unstable(held.model, weak_trials) == []
+    assert held.model.provenance["method"] == "hard-turn-ridge"
+    assert held.model.provenance["guard"]["in_place_of"] == "tls-svm"
+
+
+def test_a_penalty_of_the_method_is_the_least_that_the_guard_has(
+    mariner: ShipModel, weak_trials: list[Trial]
+) -> None:
+    """A weight so small that hardly a coefficient is left."""
+    weights = [
+        np.abs(
+            list(
+                identify(
+                    weak_trials, method=LSSVM(C=C), particulars=mariner.particulars
+                ).coefficients.values()
+            )
+        ).sum()
+        for C in (1e-6, 1e6)
+    ]
+    assert weights[0] < 0.01 * weights[1]
 
 
 def test_least_squares_is_never_penalised_but_marked(

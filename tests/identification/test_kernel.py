@@ -277,6 +277,24 @@ def test_in_environments_it_sails_as_it_is_simulated(
     assert "extrapolating" in info
 
 
+def test_a_structure_that_is_named_is_beneath_the_kernel(trials: list[Trial]) -> None:
+    """Also the one that is the default without a kernel."""
+    kernel = KernelResidual(centres=32, length=2.0, C=1e6)
+    hull = {"length": 7.0, "beam": 1.27, "draught": 0.455, "block_coefficient": 0.81}
+    named = (
+        identify(
+            trials,
+            structure="abkowitz",
+            kernel=kernel,
+            particulars=hull,
+            steering=GEAR,
+        ).model.provenance
+        or {}
+    )
+    assert named["structure"] == "abkowitz"
+    assert named["reference"]["name"].endswith("abkowitz")
+
+
 def test_what_cannot_be(
     trials: list[Trial], reference: ShipModel, truth: ShipModel
 ) -> None:
@@ -289,6 +307,9 @@ def test_what_cannot_be(
     for given, settings, message in (
         (trials, {"method": "rls"}, r"method: .*with a kernel, got 'rls'"),
         (trials, {"method": RMSVM()}, r"method: .*LS-SVM only, got an RMSVM"),
+        (trials, {"method": "rm-svm"}, r"method: .*'grey-box', .*got.*'linear'"),
+        (trials, {"structure": "auto"}, r"kernel: .*named, got 'auto'"),
+        (trials, {"structure": "nomoto"}, r"kernel: .*u, v and r, got 'nomoto'"),
         (
             short,
             {"method": "rm-svm", "reference_model": reference},

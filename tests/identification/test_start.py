@@ -1,4 +1,4 @@
-"""Where predictions start: measured velocities stay, derived ones are estimated."""
+"""Where predictions start: what is exact stays, the rest is estimated."""
 
 import numpy as np
 import pytest
@@ -29,3 +29,21 @@ def test_a_start_that_was_derived_wrong_is_found_again(drop):
     assert all(np.array_equal(found[name][1:], log[name][1:]) for name in "uvr")
     again = predict(ship, log)
     assert np.degrees(np.abs(again["psi"] - run["psi"]).max()) < 0.05
+
+
+def test_wrong_and_noisy_first_samples_do_not_make_a_prediction_drift():
+    ship = load_model("mariner")
+    run = turning_circle(ship, -25.0, 500.0, 1.0)
+    rng = np.random.default_rng(2)
+    channels = {name: run[name].copy() for name in ("psi", "u", "v", "r", "delta")}
+    for name, noise in (("psi", 0.003), ("u", 0.05), ("v", 0.05), ("r", 5e-4)):
+        channels[name] += noise * rng.standard_normal(len(run))
+    channels["r"][0] += 0.01
+    again = predict(ship, Trial(run.t, channels))
+    assert np.degrees(np.abs(again["psi"] - run["psi"]).max()) < 0.5
+
+
+def test_a_start_without_noise_stays_as_it_was_measured():
+    ship = load_model("mariner")
+    run = turning_circle(ship, -25.0, 500.0, 1.0)
+    assert with_start(ship, run) is run
