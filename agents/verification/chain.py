@@ -34,6 +34,7 @@ from shipgym.errors import InputError, UnstableModelError
 from shipgym.extras import library
 from shipgym.files import write_json
 from shipgym.manoeuvres.criteria import with_measured
+from shipgym.manoeuvres.measured import measured_by
 from shipgym.models import ShipModel
 from shipgym.plots import graph_objects
 from shipgym.tasks.task import course_keeping_task
@@ -220,7 +221,7 @@ def or_simpler(fitted: Callable[..., AutopilotResult]) -> AutopilotResult:
 def _measured(found: Verification, fit: IdentificationResult) -> Verification:
     """A verification with what the trials measured."""
     manoeuvres = found.manoeuvres
-    criteria = with_measured(manoeuvres.criteria, fit.model, fit.trials)
+    criteria = with_measured(manoeuvres.criteria, measured_by(fit.model, fit.trials))
     return replace(found, manoeuvres=replace(manoeuvres, criteria=criteria))
 
 

@@ -4,7 +4,7 @@ A side of a manoeuvre counts by its trial where there is one, else by the models
 from the covariance, if the manoeuvre lies within the envelope of the trials.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -14,12 +14,11 @@ import numpy as np
 from shipgym.errors import ManoeuvreError, UnstableModelError
 from shipgym.manoeuvres.imo_rules import Rule
 from shipgym.manoeuvres.intervals import IndexInterval, worst
-from shipgym.manoeuvres.measured import MeasuredIndex, measured_indices
+from shipgym.manoeuvres.measured import MeasuredIndex
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.stopping import StoppingIndices
 from shipgym.models.ship_model import ShipModel
 from shipgym.ships.envelope import ENVELOPE_CHANNELS
-from shipgym.trials.trial import Trial
 
 
 class Side(NamedTuple):
@@ -205,6 +204,11 @@ class Criterion:
     @property
     def note(self) -> str:
         """Remarks: why there is no verdict, and which trials would decide."""
+        if self.contradicted:
+            return (
+                "the model is at fault: its 95 % interval excludes the measured"
+                f" {self.measured:.3g} (standard error {self.measured_error:.2g})"
+            )
         if self.decided or not self.sides:
             return self.remark if self.measured is None else ""
         note = f"not decided by these trials: {_why_undecided(self)}"
@@ -214,6 +218,20 @@ class Criterion:
         elif trials:
             note += f"; run a {self.manoeuvre} to both sides"
         return note
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether the model's interval on a side excludes what was measured there."""
+        for side in self.sides:
+            interval = side.drawn.interval
+            if side.measured is None or interval is None:
+                continue
+            low, high = interval
+            reach = 1.96 * side.measured.error
+            above = high is not None and side.measured.value - reach > high
+            if above or side.measured.value + reach < low:
+                return True
+        return False
 
     @property
     def interval(self) -> tuple[float, float | None] | None:
@@ -335,19 +353,19 @@ def outside_envelope(model: ShipModel, test: Manoeuvre) -> bool:
 
 
 def with_measured(
-    criteria: Mapping[str, Criterion], model: ShipModel, trials: Sequence[Trial]
+    criteria: Mapping[str, Criterion], measured: Iterable[tuple[str, MeasuredIndex]]
 ) -> dict[str, Criterion]:
     """Criteria of a ship, by her trials where they measure them.
 
-    Of several trials to one side the worst counts. `trials`: as recorded; those of
-    another rudder angle, heading or approach speed count for nothing.
+    Of several trials to one side the worst counts. `measured`: as `measured_by` and
+    `measured_in_file` find them; trials of another rudder angle, heading or approach
+    speed are not among them.
     """
     found = dict(criteria)
-    for trial in trials:
-        for name, measured in measured_indices(model, trial).items():
-            if name in found:
-                sides = _with_trial(found[name].sides, measured)
-                found[name] = replace(found[name], sides=sides)
+    for name, index in measured:
+        if name in found:
+            sides = _with_trial(found[name].sides, index)
+            found[name] = replace(found[name], sides=sides)
     return found
 
 

@@ -10,6 +10,7 @@ from shipgym.manoeuvres.criteria import (
     Side,
     criterion_of,
     outside_envelope,
+    with_measured,
 )
 from shipgym.manoeuvres.imo_rules import (
     STOPPING,
@@ -18,6 +19,7 @@ from shipgym.manoeuvres.imo_rules import (
     trial_in_words,
 )
 from shipgym.manoeuvres.intervals import IndexInterval, intervals_of, own_indices
+from shipgym.manoeuvres.measured import measured_in_file
 from shipgym.models.by_name import takes_name
 from shipgym.models.ship_model import ShipModel
 
@@ -68,7 +70,8 @@ def imo_criteria(
 
     A manoeuvre that was not completed fails its criteria. Of an identified ship a
     criterion is decided only where the manoeuvre is within the envelope of her trials
-    and the draws are on one side of the limit.
+    and the draws are on one side of the limit, or by what these trials measured, which
+    the model file has.
     """
     outside = {}
     for name, manoeuvre in imo_manoeuvres(model).items():
@@ -91,7 +94,7 @@ def imo_criteria(
         criteria[criterion] = criterion_of(rule, sides, trial)
     stop = found.get(STOPPING.manoeuvre)
     criteria["stopping"] = stopping_criterion(model, stop)
-    return criteria
+    return with_measured(criteria, measured_in_file(model))
 
 
 def stopping_criterion(

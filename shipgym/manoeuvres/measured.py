@@ -4,6 +4,7 @@ They are read from a smoothed heading and track: the largest of noisy samples re
 high. Source of the smoothing: Reinsch 1967, Smoothing by spline functions.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ from scipy.interpolate import make_smoothing_spline
 from scipy.special import ndtr
 
 from shipgym.arrays import Floats
+from shipgym.checks import check_choice, check_number, check_table
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import rudder, usual_rudder
 from shipgym.manoeuvres.imo_rules import RULES, Rule
@@ -38,6 +40,40 @@ class MeasuredIndex:
         if self.error == 0.0:
             return float(self.value <= limit)
         return float(ndtr((limit - self.value) / self.error))
+
+
+def measured_by(
+    model: ShipModel, trials: Sequence[Trial]
+) -> list[tuple[str, MeasuredIndex]]:
+    """Criteria that trials measure, each by its name, in the order of the trials."""
+    found = list[tuple[str, MeasuredIndex]]()
+    for trial in trials:
+        found += measured_indices(model, trial).items()
+    return found
+
+
+def measured_in_file(model: ShipModel) -> list[tuple[str, MeasuredIndex]]:
+    """Criteria that the trials of an identified model measured, by its file.
+
+    Raises InputError for indices that do not fit the trials of the file.
+    """
+    provenance = model.provenance or {}
+    table = provenance.get("measured", {})
+    trials = [trial.get("name") for trial in provenance.get("trials", ())]
+    where = f"{model.name}: provenance.measured"
+    found = list[tuple[str, MeasuredIndex]]()
+    for trial, indices in check_table(table, where, trials).items():
+        names = check_table(indices, f"{where} {trial}", RULES)
+        for name, fields in names.items():
+            own = f"{where} {trial} {name}"
+            values = check_table(fields, own, ("value", "error", "side"))
+            index = MeasuredIndex(
+                check_number(values.get("value"), f"{own} value"),
+                check_number(values.get("error"), f"{own} error", at_least=0.0),
+                check_choice(values.get("side"), ("starboard", "port"), f"{own} side"),
+            )
+            found.append((name, index))
+    return found
 
 
 def measured_indices(model: ShipModel, trial: Trial) -> dict[str, MeasuredIndex]:

@@ -22,7 +22,11 @@ from shipgym.manoeuvres.criteria import (
 )
 from shipgym.manoeuvres.imo_rules import RULES
 from shipgym.manoeuvres.intervals import IndexInterval
-from shipgym.manoeuvres.measured import MeasuredIndex, measured_indices
+from shipgym.manoeuvres.measured import (
+    MeasuredIndex,
+    measured_by,
+    measured_indices,
+)
 from shipgym.trials.sensors import Sensors
 
 
@@ -138,7 +142,7 @@ def test_a_measured_manoeuvre_goes_before_the_model(of_zigzags):
     turn = turning_circle(ship, -35.0, duration=1200.0, dt=1.0)
     small = turning_circle(ship, 20.0, duration=1200.0, dt=1.0)
     weave = zigzag(ship, 10, 10, duration=900.0, dt=1.0)
-    found = with_measured(of_zigzags, ship, [turn, small, weave])
+    found = with_measured(of_zigzags, measured_by(ship, [turn, small, weave]))
     advance = found["advance"]
     own = turning_indices(turn, 320.0).advance_lengths
     assert advance.measured == pytest.approx(own, abs=0.01)
@@ -148,11 +152,11 @@ def test_a_measured_manoeuvre_goes_before_the_model(of_zigzags):
     assert found["overshoot_1_20_20"].measured is None
 
     other = turning_circle(ship, 35.0, duration=1200.0, dt=1.0)
-    passed = with_measured(of_zigzags, ship, [turn, other])["advance"]
+    passed = with_measured(of_zigzags, measured_by(ship, [turn, other]))["advance"]
     assert (passed.passed, passed.decided_by) == (True, "trials")
     assert passed.probability > 0.999
     strict = {"advance": replace(of_zigzags["advance"], limit=2.0)}
-    failed = with_measured(strict, ship, [turn])["advance"]
+    failed = with_measured(strict, measured_by(ship, [turn]))["advance"]
     assert failed.passed is False
     assert failed.probability < 1e-3
 
