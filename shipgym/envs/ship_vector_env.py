@@ -94,6 +94,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         self.autoreset_mode = mode  # read by TorchRL
         self._names = self.task.info_names
         self._flags = self._engine.flag_names
+        self._masks: dict[str, Flags] = {}  # of steps, where every row has its infos
         self._own_reward = not self.task.definition.shipped
         self._longest = np.inf
         if max_episode_steps is not None and max_episode_steps != -1:
@@ -192,6 +193,10 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             gather_constraints(infos, self._constraints, self._constraint_cost)
             masks = {f"_{name}": mask for name in self._constraints}
             infos["constraints"] |= masks
+        if mask is self._engine.all_lanes:
+            if not self._masks:
+                self._masks = {f"_{name}": mask for name in infos}
+            return infos | self._masks
         return infos | {f"_{name}": mask for name in infos}
 
     def _note_ends(self, infos: Infos, ended: Flags) -> LastInfo:
