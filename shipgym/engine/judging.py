@@ -205,7 +205,9 @@ def outcome_of(
 ) -> Outcome:
     """Return the outcome of an interval, from the verdict of the task.
 
-    A failed episode costs the largest cost for each of the remaining intervals.
+    A failed episode costs the largest cost for each of the remaining intervals. In a
+    bounded reward it is paid the least reward for those that the end stands for, and
+    one that has arrived the largest.
     """
     rules = settings.rules
     going = 1.0 - counters.ended
@@ -214,10 +216,14 @@ def outcome_of(
     terminated = max(wrecked, going * pick(arrived, 1.0, 0.0))
     late = pick(counters.steps >= rules.time_limit, going, 0.0)
     steps_left = rules.time_limit - counters.steps
+    seen_steps = min(steps_left, rules.loss_horizon)
     worst = worst_cost(settings.task)
     end = -(wrecked * worst * steps_left)
-    seen_end = -(wrecked * worst * min(steps_left, rules.loss_horizon))
-    bounded = bounded_reward(-earned, going, wrecked, terminated, rules)
+    seen_end = -(wrecked * worst * seen_steps)
+    arrived_now = terminated - wrecked
+    bounded = (going - wrecked) * bounded_reward(-earned, rules)
+    bounded += arrived_now * seen_steps * rules.perfect_step
+    bounded += wrecked * (seen_steps + 1.0) * (rules.perfect_step - 1.0)
     return Outcome(
         reward=pick(rules.half_reward_cost > 0.0, bounded, earned + seen_end),
         terminated=terminated,
@@ -229,23 +235,10 @@ def outcome_of(
     )
 
 
-def bounded_reward(
-    cost: float,
-    going: float,
-    wrecked: float,
-    terminated: float,
-    rules: Rules,
-) -> float:
-    """Reward from 0 to 1 of an interval with a cost, to 2 where the cost is negative.
-
-    A lost ship earns nothing any more, which no ship that goes on falls below at any
-    discount. One that has arrived is paid the reward of no cost for the intervals
-    that the end stands for, so that she does not linger.
-    """
+def bounded_reward(cost: float, rules: Rules) -> float:
+    """Reward of an interval with a cost: from that of no cost to one less."""
     scale = max(rules.half_reward_cost, 1e-300)  # 0 where this is not used
-    rate = 1.0 - cost / (scale + fabs(cost))
-    arrived = terminated - wrecked
-    return (going - wrecked) * rate + arrived * rules.loss_horizon
+    return rules.perfect_step - cost / (scale + fabs(cost))
 
 
 def store_task(tile: Tile, lane: int, task_state: Any) -> None:

@@ -14,6 +14,7 @@ class Rules(NamedTuple):
     largest_distance: float  # from the data of the model at which an episode ends
     least_shaft: float  # least command of the shaft, part of service speed
     half_reward_cost: float  # that halves a bounded reward; 0 where it has no bounds
+    perfect_step: float  # bounded reward of a step without cost
     loss_horizon: float  # control intervals that the end of an episode stands for
 
 

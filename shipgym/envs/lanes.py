@@ -153,6 +153,7 @@ class Lanes:
             largest_distance=task.max_envelope_distance,
             least_shaft=task.least_shaft(self.model),
             half_reward_cost=task.half_reward_cost,
+            perfect_step=task.definition.perfect_step,
             loss_horizon=task.end_intervals,
         )
         sensors = self.program.sensors

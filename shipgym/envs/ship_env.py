@@ -34,11 +34,11 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
 
     The action is the commanded rudder, -1 to 1 of its limit, positive to starboard. The
     observation holds the quantities of `observation_names`, each divided by its entry
-    of `observation_scales`. The reward of a step is `1 - cost / (cost + 0.1)` by its
-    steering cost, which `info` has, and minus its parts by name; with `bounded=False`
-    it is minus the cost. Settings, observations and cost are defined in the task's
-    file (`shipgym/tasks/course_keeping.py`, `shipgym/tasks/path_following.py`, or one
-    of your own).
+    of `observation_scales`. The reward of a step follows from its steering cost, which
+    `info` has, with minus its parts by name (`shipgym.tasks.contract`); with
+    `bounded=False` it is minus the cost. Settings, observations and cost are defined in
+    the task's file (`shipgym/tasks/course_keeping.py`,
+    `shipgym/tasks/path_following.py`, or one of your own).
 
     Raises InputError for an unknown model or keyword, or an argument out of its range.
 

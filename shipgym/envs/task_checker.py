@@ -375,11 +375,13 @@ def _hard_to_learn(engine: Engine) -> Iterator[str]:
         )
 
     scale = engine.task.half_reward_cost
-    if scale > 0.0 and median < faint:
-        least = max(median, 1e-9)
-        cost = scale / least - scale
+    least_reward = engine.task.definition.perfect_step - 1.0
+    above_least = float(np.median(rewards)) - least_reward
+    if scale > 0.0 and above_least < faint:
+        cost = scale / max(above_least, 1e-9) - scale
         yield (
-            f"reward: expected a median above {faint:g} under random orders, got"
-            f" {median:.2g}: a step costs {cost:.3g}, which earns next to nothing with"
-            f" bounded={scale:g}; give a tenth of that cost as bounded"
+            f"reward: expected a median of {faint:g} above the least reward under"
+            f" random orders, got {above_least:.2g}: a step costs {cost:.3g}, which"
+            f" earns next to nothing with bounded={scale:g}; give a tenth of that cost"
+            " as bounded"
         )

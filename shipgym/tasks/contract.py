@@ -50,11 +50,14 @@ behind `settings`. There `plan` is only read, and `random` holds the numbers of 
 interval, not of the episode: `drawn(random, 0, low, high)` is another in each.
 `numpy.random` and `random` are refused.
 
-The engine makes the reward of the cost c of a step, for any task: 1 - c / (c + b),
-where the keyword `bounded` is b, 0.1 by default. A lost ship earns nothing from then
-on, and one that has arrived 1 for each interval of the keyword `loss_horizon`. Let
-c = 1 be the cost of a ship that makes no headway: then lingering does not pay. With
-`bounded=False` the reward is minus the cost.
+The engine makes the reward of the cost c of a step, for any task: p - c / (c + b). At
+its end a lost ship is paid the least reward, p - 1, and one that has arrived the
+largest, p, for each interval of the horizon, or of the rest of the episode if that is
+shorter. b is `HALF_REWARD_COST`, 0.1 by default, or the keyword `bounded`; p is
+`PERFECT_STEP`, from 0 to 1, by default 1; the horizon is `LOSS_HORIZON`, 100 by
+default, `math.inf` for all the rest, or the keyword `loss_horizon`. Let c = 1 be the
+cost of a ship that makes no headway: then lingering does not pay. With `bounded=False`
+the reward is minus the cost.
 
 A field `heading_setpoint` of `State`, rad, is `set_point` in `physical_state()` and in
 pictures.

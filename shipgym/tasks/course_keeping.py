@@ -6,7 +6,7 @@ rate (weight 0.01), all in units of 30 degrees, the rate per ship length sailed 
 the largest heading error, so that ending early is never an advantage.
 """
 
-from math import copysign, fabs, floor, radians
+from math import copysign, fabs, floor, inf, radians
 from typing import Annotated, NamedTuple
 
 from shipgym.engine.mathematics import pick, wrap
@@ -36,6 +36,11 @@ from shipgym.tasks.steering import (
 NAME = "CourseKeeping"
 REPORTED = ("heading_error",)
 CONSTRAINTS = ("heel",)
+# A reward of minus 1 to 0, in the order of the costs at any discount from 0.99 to 1. No
+# ship arrives, so nothing has to be paid for going on.
+HALF_REWARD_COST = 3.0
+PERFECT_STEP = 0.0
+LOSS_HORIZON = inf  # the rest of the episode
 
 
 class Settings(NamedTuple):

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import inf
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -60,6 +61,13 @@ FUNCTIONS = {
     "rule": ("seen", "ship", "settings"),
     "check": ("settings", "model"),
     "listed": ("value",),
+}
+#: Numbers of a task that have defaults, besides `EPISODE_STEPS`, with their bounds.
+NUMBERS: dict[str, dict[str, float]] = {
+    "STEPS_PER_LENGTH": {"at_least": 0.2},
+    "HALF_REWARD_COST": {"above": 0.0},
+    "PERFECT_STEP": {"at_least": 0.0, "at_most": 1.0},
+    "LOSS_HORIZON": {"at_least": 0.0},
 }
 #: Names in `info` that are the engine's.
 TAKEN = (
@@ -139,6 +147,9 @@ class TaskDefinition(Configurable):
         Control intervals after which an episode is truncated, by default.
     steps_per_length : float
         Control intervals in the time to travel one ship length, about, by default.
+    half_reward_cost, perfect_step, loss_horizon : float
+        Bounded reward: cost of a step that earns 0.5 less than one without cost, what
+        that earns, and control intervals that the end of an episode stands for.
     """
 
     State: Record
@@ -157,6 +168,9 @@ class TaskDefinition(Configurable):
     constraints: tuple[str, ...] = ()
     episode_steps: int = 600
     steps_per_length: float = STEPS_PER_LENGTH
+    half_reward_cost: float = 0.1
+    perfect_step: float = 1.0
+    loss_horizon: float = 100.0
     current: Callable[..., Any] | None = None
     draw: Callable[..., Any] | None = None
     rule: Callable[..., Any] | None = None
@@ -294,8 +308,11 @@ def _definition_of(namespace: Any, where: str) -> TaskDefinition:
         source=where,
         reported=tuple(getattr(namespace, "REPORTED", ())),
         constraints=tuple(getattr(namespace, "CONSTRAINTS", ())),
-        episode_steps=getattr(namespace, "EPISODE_STEPS", TaskDefinition.episode_steps),
-        steps_per_length=getattr(namespace, "STEPS_PER_LENGTH", STEPS_PER_LENGTH),
+        **{
+            name.lower(): getattr(namespace, name)
+            for name in ("EPISODE_STEPS", *NUMBERS)
+            if hasattr(namespace, name)
+        },
         **found,
     )
 
@@ -317,9 +334,10 @@ def _check_task(namespace: Any, where: str) -> None:
     if hasattr(namespace, "EPISODE_STEPS"):
         steps = namespace.EPISODE_STEPS
         check_whole(steps, f"{where}: EPISODE_STEPS", at_least=1)
-    if hasattr(namespace, "STEPS_PER_LENGTH"):
-        steps = namespace.STEPS_PER_LENGTH
-        check_number(steps, f"{where}: STEPS_PER_LENGTH", at_least=0.2)
+    for name, limits in NUMBERS.items():
+        value = getattr(namespace, name, inf)  # the horizon may be the whole episode
+        if value != inf:
+            check_number(value, f"{where}: {name}", **limits)
 
 
 def _check_reported(namespace: Any, table: str, where: str) -> None:

@@ -9,7 +9,7 @@ without a turn change nothing. Running aground costs as much as the rest of the 
 there.
 """
 
-from math import copysign, fabs, pi, radians, sqrt, tan
+from math import copysign, fabs, inf, pi, radians, sqrt, tan
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -66,6 +66,10 @@ REPORTED = (
 )
 CONSTRAINTS = ("corridor", "heel")
 EPISODE_STEPS = 1500
+# A reward of 0 to 1: a ship aground earns nothing for the rest of the episode, and one
+# that has arrived is paid for the rest of it.
+HALF_REWARD_COST = 1.0
+LOSS_HORIZON = inf
 
 WORST_PROGRESS = 2.0  # cost of a step against the path
 

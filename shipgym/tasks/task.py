@@ -3,6 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from math import inf
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -43,10 +44,6 @@ VECTOR_OPTIONS = (
 )
 
 ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft", "rudder-shaft-discrete")
-#: Cost of a step that earns half of a bounded reward, and control intervals that the
-#: end of an episode stands for, by default.
-HALF_REWARD_COST = 0.1
-LOSS_HORIZON = 100.0
 #: Rudder orders of a discrete action, parts of the rudder limit.
 RUDDER_ORDERS = (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 1.0)
 #: Shaft orders of a discrete action, parts of the speed at service speed, as of an
@@ -101,15 +98,14 @@ class Task:
     water_depth : float
         m; for ships that know shallow water.
     bounded : bool or float
-        Whether the reward of a step is bounded, 1 - cost / (cost + scale); a number
-        is the scale, the cost of a step that earns a half, `HALF_REWARD_COST` by
-        default. False for minus the cost.
+        Whether the reward of a step is bounded, `PERFECT_STEP` - cost / (cost + scale);
+        a number is the scale, the task's `HALF_REWARD_COST` by default. False for minus
+        the cost.
     loss_horizon : float or None
-        Control intervals that the end of an episode stands for: a bounded reward pays
-        a ship that has arrived 1 for each, and one that is lost nothing; minus the
-        cost charges a lost one the worst. By default `LOSS_HORIZON`, the horizon
-        1 / (1 - 0.99) of a learner's discount, or, of minus the cost, the rest of the
-        episode.
+        Control intervals that the end of an episode stands for, at most its rest: a
+        bounded reward pays a ship that has arrived the largest reward for each, and one
+        that is lost the least; minus the cost charges a lost one the worst. By default
+        the task's `LOSS_HORIZON`, or, of minus the cost, the rest of the episode.
     checked : bool
         Whether functions of your own are compiled with checks of indices and, where an
         episode begins or an event is due, of divisors.
@@ -357,7 +353,7 @@ class Task:
     def half_reward_cost(self) -> float:
         """Cost of a step that earns half of a bounded reward; 0 for minus the cost."""
         if isinstance(self.bounded, bool):
-            return HALF_REWARD_COST if self.bounded else 0.0
+            return self.definition.half_reward_cost if self.bounded else 0.0
         return float(self.bounded)
 
     @property
@@ -365,7 +361,8 @@ class Task:
         """Control intervals that the end of an episode stands for."""
         if self.loss_horizon is not None:
             return float(self.loss_horizon)
-        return LOSS_HORIZON if self.bounded else float(self.episode_steps)
+        horizon = self.definition.loss_horizon if self.bounded else inf
+        return min(horizon, float(self.episode_steps))
 
     def least_shaft(self, model: ShipModel) -> float:
         """Least command of the shaft, part of service speed; 0 if it stays ahead."""
