@@ -17,7 +17,13 @@ from shipgym.tasks.task import RUDDER_ORDERS
 EPISODES = 10
 FIRST_SEED = 1000
 STEERED = ("CourseKeeping", "PathFollowing")
-IDS = [name for name, made in ENVIRONMENTS.items() if made["task"] in STEERED]
+# RudderRoll, with its own scale, has a rank correlation of 0.97 and is not among them;
+# an encounter's reward is minus the cost.
+IDS = [
+    name
+    for name, made in ENVIRONMENTS.items()
+    if made["task"] in STEERED and "RudderRoll" not in name
+]
 
 
 class Controller(NamedTuple):
