@@ -13,7 +13,6 @@ from agents.controllers.task_rule import TaskRule
 from agents.rollouts.rollout import rollout
 from agents.suites.suite import BenchmarkTask
 from shipgym.errors import InputError
-from shipgym.tasks.task import HALF_REWARD_COST
 
 
 class ZeroAction:
@@ -68,16 +67,17 @@ def yardsticks(task: BenchmarkTask) -> Mapping[str, Policy]:
 def half_reward_cost(task: BenchmarkTask, seeds: ArrayLike) -> float:
     """Cost of a step that is to earn half of the bounded reward of a task.
 
-    It is 0.1, the default of environments, where a step under random actions earns
-    between 0.02 and 0.98 by it; otherwise a tenth of the median cost of such a step, so
-    that a task may count in any unit.
+    It is the task's own, 0.1 if its file has none, where a step under random actions
+    earns between 0.02 and 0.98 by it; otherwise a tenth of the median cost of such a
+    step, so that a task may count in any unit.
     """
     engine = task.engine(len(np.asarray(seeds)))
     random = RandomActions(task.task.n_commands)
     run = rollout(random, engine, seeds, record=["reward_end"])
     median = float(np.median(-run.rewards[run.sailing]))
-    earned = HALF_REWARD_COST / (HALF_REWARD_COST + max(median, 0.0))
+    usual = task.task.definition.half_reward_cost
+    earned = usual / (usual + max(median, 0.0))
     faint = 0.02
     if faint <= earned <= 1.0 - faint or not median > 0.0:
-        return HALF_REWARD_COST
+        return usual
     return 0.1 * median

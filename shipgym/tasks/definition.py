@@ -63,7 +63,7 @@ FUNCTIONS = {
     "listed": ("value",),
 }
 #: Numbers of a task that have defaults, besides `EPISODE_STEPS`, with their bounds.
-NUMBERS: dict[str, dict[str, float]] = {
+NUMBERS: dict[str, dict[str, Any]] = {
     "STEPS_PER_LENGTH": {"at_least": 0.2},
     "HALF_REWARD_COST": {"above": 0.0},
     "PERFECT_STEP": {"at_least": 0.0, "at_most": 1.0},
