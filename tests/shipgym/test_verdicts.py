@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipgym import UnstableModelError, load_model
+from shipgym import InputError, UnstableModelError, load_model
 from shipgym.manoeuvres import (
     imo_assessment,
     standard_manoeuvres,
@@ -25,6 +25,7 @@ from shipgym.manoeuvres.intervals import IndexInterval
 from shipgym.manoeuvres.measured import (
     MeasuredIndex,
     measured_by,
+    measured_in_file,
     measured_indices,
 )
 from shipgym.trials.sensors import Sensors
@@ -159,6 +160,30 @@ def test_a_measured_manoeuvre_goes_before_the_model(of_zigzags):
     failed = with_measured(strict, measured_by(ship, [turn]))["advance"]
     assert failed.passed is False
     assert failed.probability < 1e-3
+
+
+def test_what_trials_measured_travels_in_the_model_file():
+    index = {"value": 3.0, "error": 0.1, "side": "port"}
+    provenance = {
+        "trials": [{"name": "turn"}],
+        "measured": {"turn": {"advance": index}},
+    }
+    ship = replace(load_model("kvlcc2"), provenance=provenance)
+    assert measured_in_file(ship) == [("advance", MeasuredIndex(**index))]
+    for wrong, message in (
+        ({"other": {"advance": index}}, "measured: .*'other'"),
+        ({"turn": {"advance": index | {"side": "aft"}}}, "advance side: "),
+    ):
+        known = replace(ship, provenance=provenance | {"measured": wrong})
+        with pytest.raises(InputError, match=message):
+            measured_in_file(known)
+
+
+def test_a_model_whose_interval_excludes_a_measurement_is_at_fault():
+    found = overshoot(1.8, 1.8, 0.1, starboard=(1.45, 0.02))
+    assert "the model is at fault" in found.note
+    near = overshoot(1.8, 1.8, 0.1, starboard=(1.75, 0.02))
+    assert "at fault" not in near.note
 
 
 def test_a_draw_that_spins_as_no_ship_can_has_no_index():
