@@ -61,7 +61,7 @@ ENVIRONMENTS: dict[str, dict[str, Any]] = {
         "change_interval_steps": 100,
         "max_heading_error_deg": 120.0,
         "cost_lengths": 0.25,
-        "bounded": 1.0,
+        "bounded": 10.0,
     },
     "shipgym/PathFollowing-v0": {
         "task": "PathFollowing",
