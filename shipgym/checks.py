@@ -333,7 +333,8 @@ def check_shape(value: Any, shape: Shape, where: str) -> None:
     elif type(value) not in shape:
         words = []
         for kind in shape:
-            words.append(_WORDS.get(kind, kind.__name__))
+            word = _WORDS.get(kind, kind.__name__)
+            words.append(word)
         expected = " or ".join(dict.fromkeys(words))
         raise unexpected(where, expected, value)
 

@@ -152,13 +152,13 @@ def read_text(path: Path, what: str, largest: int) -> str:
 def _not_utf_8(path: Path, what: str, data: bytes, start: int) -> InputError:
     """Error for a file whose bytes are not UTF-8 from `start` on."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        place, found = str(path), "UTF-16"
+        place = str(path)
+        found = "UTF-16"
     else:
         line = data.count(b"\n", 0, start) + 1
-        place, found = (
-            f"{path}: line {line}",
-            f"byte 0x{data[start]:02x} (binary content)",
-        )
+        byte = data[start]
+        place = f"{path}: line {line}"
+        found = f"byte 0x{byte:02x} (binary content)"
     return InputError(
         f"{place}: expected a {what} in UTF-8, got {found}; save it as text in UTF-8"
     )

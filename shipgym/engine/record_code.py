@@ -101,7 +101,8 @@ def _storer(
     lines = []
     for path, row in rows.numbers.items():
         entry = _entry(row, lanes, names)
-        lines.append(f"{entry} = {stored(path, _part('record', path))}")
+        value = stored(path, _part("record", path))
+        lines.append(f"{entry} = {value}")
     return written(f"store_{rows.record.__name__}", arguments, lines, names)
 
 

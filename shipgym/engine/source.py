@@ -35,10 +35,9 @@ def read_source(source: Any) -> tuple[Any, str]:
     if isinstance(source, str | Path):
         namespace = load_file(Path(source))
     file = getattr(namespace, "__file__", None)
-    if file:
-        return namespace, str(file)
     name = getattr(namespace, "__name__", source)
-    return namespace, str(name)
+    place = str(file or name)
+    return namespace, place
 
 
 def kept_source(source: Any) -> Any:

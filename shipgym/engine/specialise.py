@@ -57,7 +57,8 @@ def users_functions(function: Any, hooks: Hooks) -> set[Any]:
     found = {function}
     new = [function]
     while new:
-        for _, value in named_globals(new.pop(), hooks):
+        one = new.pop()
+        for _, value in named_globals(one, hooks):
             if is_plain(value) and value not in found:
                 found.add(value)
                 new.append(value)

@@ -206,8 +206,9 @@ class Engine(Lanes):
 
     def _refuse_orders(self) -> NoReturn:
         """Raise an InputError that names the first command that is not finite."""
-        wrong = np.argwhere(~np.isfinite(self._orders))
-        lane, command = wrong[0]
+        is_wrong = ~np.isfinite(self._orders)
+        places = np.argwhere(is_wrong)
+        lane, command = places[0]
         found = self._orders[lane, command]
         raise InputError(
             f"actions: expected numbers in [-1, 1], got {found} in lane {lane}"
@@ -442,7 +443,8 @@ def refuse_unstable(models: Iterable[ShipModel], allow_unstable: bool = False) -
     """
     for model in models:
         provenance = model.provenance or {}
-        if provenance.get("stable") is False:
+        is_stable = provenance.get("stable", True)
+        if is_stable is False:
             _refuse_or_warn(model.name, allow_unstable)
             return
 

@@ -175,15 +175,10 @@ class ShipsEnv:
         for name in ("self", "__class__"):
             given.pop(name, None)
         self._arguments = given | options
-        self.render_mode = given["render_mode"]
-        if self.render_mode is not None:
-            check_choice(
-                self.render_mode,
-                render_modes,
-                "render_mode",
-                also=", or None",
-            )
-
+        mode = given["render_mode"]
+        if mode is not None:
+            check_choice(mode, render_modes, "render_mode", also=", or None")
+        self.render_mode = mode
         self.model, self.task, self.randomisation = read_options(
             given["task"], given["model"], options, taken
         )
@@ -206,24 +201,27 @@ class ShipsEnv:
             threads=given.get("threads", 1),
         )
         self._asked: dict[str, Any] = {}
-        self._artists: list[Artist] = []
-        if self.render_mode is not None:
-            self._artists = _artists(self.render_mode, num_envs)
+        self._artists = [] if mode is None else _artists(mode, num_envs)
+        self._observe_and_order(num_envs)
+        self._begun = False  # and not closed since
+        self._keys: NDArray[np.uint64] | None = None  # of each row's episodes
+        self._use(self._own_engine)
+        return spaces(self.task, self.model, self.pace.frame_stack)
+
+    def _observe_and_order(self, num_envs: int) -> None:
+        """Prepare what agents see and what discrete actions order."""
         observed = self.task.observed(self.model)
         self.observation_names = tuple(quantity.name for quantity in observed)
         self.observation_scales = np.array([quantity.scale for quantity in observed])
+        self._frames: Frames | None = None
+        depth = self.pace.frame_stack
+        if depth > 1:
+            self._frames = Frames(num_envs, depth, len(observed))
         # of each command of a discrete action
         self._orders: list[NDArray[np.float32]] = []
         for orders in self.task.orders(self.model):
             self._orders.append(np.array(orders, dtype=np.float32))
         self.pace.check_reaches(self._orders)
-        self._frames: Frames | None = None
-        if self.pace.frame_stack > 1:
-            self._frames = Frames(num_envs, self.pace.frame_stack, len(observed))
-        self._begun = False  # and not closed since
-        self._keys: NDArray[np.uint64] | None = None  # of each row's episodes
-        self._use(self._own_engine)
-        return spaces(self.task, self.model, self.pace.frame_stack)
 
     @property
     def corridor(self) -> float | None:
@@ -255,7 +253,8 @@ class ShipsEnv:
             return observations
         if begun is None:
             self._frames.add(observations)
-            begun = self._engine.steps == 0.0
+            steps = self._engine.steps
+            begun = steps == 0.0
         if begun.any():
             self._frames.begin(observations, begun)
         return self._frames.shown
@@ -298,7 +297,8 @@ class ShipsEnv:
 
     def _counters(self) -> dict[str, Any]:
         """Numbers that a copy has in addition to the engine's."""
-        counters = {"row_keys": np.array(self._keys)}
+        keys = np.array(self._keys)
+        counters = {"row_keys": keys}
         if self._frames is not None:
             counters["frames"] = self._frames.shown
         return counters
@@ -313,9 +313,10 @@ class ShipsEnv:
 
     def _continue(self, state: Mapping[str, Any]) -> None:
         """Continue from the state of an environment with the same arguments."""
-        self._asked = dict(state["asked"])
         self._begun = True
-        engine = self._engine_for(self._asked)
+        asked = dict(state["asked"])
+        self._asked = asked
+        engine = self._engine_for(asked)
         engine.set_state(state["engine"])
         self._use(engine)
         self._recall(state)

@@ -90,8 +90,9 @@ class OutputPool:
             "flags": np.zeros((n_flags, num_envs), dtype=np.bool_),
         }
         self.blocks, self._size = allocated(tables)
-        self._shapes = [(at.rows, at.columns) for at in self.blocks.values()]
-        self._firsts = [WORD * at.first for at in self.blocks.values()]
+        places = self.blocks.values()
+        self._shapes = [(at.rows, at.columns) for at in places]
+        self._firsts = [WORD * at.first for at in places]
         self._free: list[bytearray] = []
 
     def take(self) -> Outputs:

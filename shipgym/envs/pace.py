@@ -91,15 +91,17 @@ class PacedSteps:
             return engine.advance()  # refuses them
         over = engine.read("ended") > 0.0
         n_ended = 0
-        sums = np.zeros((len(self._summed), engine.num_envs))
-        ends = np.zeros((ANSWER_FLAGS, engine.num_envs), dtype=np.bool_)
-        for interval in range(self.repeat):
+        n_lanes = engine.num_envs
+        sums = np.zeros((len(self._summed), n_lanes))
+        ends = np.zeros((ANSWER_FLAGS, n_lanes), dtype=np.bool_)
+        for _ in range(self.repeat):
             engine.command[...] = toward(asked, self._in_force(), self.rate)
-            n_ended += engine.advance(anew=anew and interval == 0)
-            sums += engine.outputs.outcomes[self._summed]
-            ends |= engine.outputs.flags[:ANSWER_FLAGS]
+            n_ended += engine.advance(anew=anew)
+            anew = False
+            outputs = engine.outputs
+            sums += outputs.outcomes[self._summed]
+            ends |= outputs.flags[:ANSWER_FLAGS]
 
-        outputs = engine.outputs
         outputs.outcomes[self._summed] = sums
         outputs.outcomes[1:ANSWER_OUTCOMES] = ends
         outputs.flags[:ANSWER_FLAGS] = ends

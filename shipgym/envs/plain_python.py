@@ -99,7 +99,8 @@ def _result_of(function: Any, reward: Any, form: Any, *arguments: Any) -> Any:
     if fault and reward is not None:
         fault = fault.replace("result 2", "returned value")  # the reward
     if fault:
-        raise InputError(f"{place_of(innermost(reward or function))}: {fault}")
+        called = innermost(reward or function)
+        raise InputError(f"{place_of(called)}: {fault}")
     return given
 
 

@@ -195,7 +195,8 @@ def _draw_path(chart: _Chart, engine: Engine, lane: int) -> None:
     waypoints = engine.waypoints(lane)
     if waypoints is None:
         return
-    points: Any = track(waypoints, engine.path_metres("turn_radius"))
+    radius = engine.path_metres("turn_radius")
+    points: Any = track(waypoints, radius)
     corridor = engine.path_metres("corridor")
     if corridor is not None:
         half = corridor / chart.metres

@@ -96,14 +96,18 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         self._flags = self._engine.flag_names
         self._masks: dict[str, Flags] = {}  # of steps, where every row has its infos
         self._own_reward = not self.task.definition.shipped
-        self._longest = np.inf
-        if max_episode_steps is not None and max_episode_steps != -1:
-            longest = check_whole(max_episode_steps, "max_episode_steps", at_least=1)
-            self._longest = longest * self.pace.action_repeat
+        self._longest = self._intervals(max_episode_steps)
         self._some_over = False  # NEXT_STEP: whether episodes ended in the last step
         self._keeps_ends = mode is AutoresetMode.DISABLED
         self._over = np.zeros(self.num_envs, dtype=np.bool_)  # then, rows to reset
         self._made()
+
+    def _intervals(self, steps: int | None) -> float:
+        """Control intervals of the longest episode, which may have as many steps."""
+        if steps is None or steps == -1:
+            return np.inf
+        longest = check_whole(steps, "max_episode_steps", at_least=1)
+        return longest * self.pace.action_repeat
 
     def _counters(self) -> dict[str, Any]:
         counters = super()._counters()
@@ -215,7 +219,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         options = options or {}
         mask: Any = options.get("reset_mask", self._engine.all_lanes)
         is_flags = isinstance(mask, np.ndarray) and mask.dtype == np.bool_
-        if not is_flags or mask.shape != (self.num_envs,):
+        shape = (self.num_envs,)
+        if not is_flags or mask.shape != shape:
             expected = f"a bool array of {self.num_envs}"
             raise unexpected("options: reset_mask", expected, mask)
         if not mask.any():

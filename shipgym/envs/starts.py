@@ -60,13 +60,16 @@ def start_lanes(engine: Engine, asked: Any, chosen: Flags) -> None:
     chosen : bool array of shape (num_envs,)
     """
     start = plain(start_lane, engine.program.hooks)
-    rows = _rows(engine, asked)
-    for lane in np.flatnonzero(chosen).tolist():
-        one = Start(**{name: float(values[lane]) for name, values in rows.items()})
+    columns = _columns(engine, asked)
+    lanes = np.flatnonzero(chosen)
+    for lane in lanes.tolist():
+        asked_here = {}
+        for name, values in columns.items():
+            asked_here[name] = float(values[lane])
+        one = Start(**asked_here)
         with np.errstate(all="ignore"):
             fits = start(engine._memory, engine.outputs.memory, lane, one)
         if not fits:
-            asked_here = {name: float(values[lane]) for name, values in rows.items()}
             raise InputError(
                 "options: start: expected a ship that is under control and on her way,"
                 f" got one beyond the physical range, lost or arrived in lane {lane}:"
@@ -74,32 +77,43 @@ def start_lanes(engine: Engine, asked: Any, chosen: Flags) -> None:
             )
 
 
-def _rows(engine: Engine, asked: Any) -> Mapping[str, Any]:
+def _columns(engine: Engine, asked: Any) -> Mapping[str, Any]:
     """Numbers of each lane by name; InputError for those that do not fit."""
-    where = "options: start"
     known = list(Start._fields)
     state = field_types(engine.task.definition.State)
     if "heading_setpoint" not in state:
         known.remove("heading_error")
     if not {"leg", "cross_track"} <= set(state):
         known.remove("cross_track")
+    where = "options: start"
     check_keys(check_table(asked, where), known, where)
-    rows = {}
+    columns = {}
     for name, values in asked.items():
-        numbers = check_finite(values, f"{where}: {name}")
-        if numbers.shape not in ((), (engine.num_envs,)):
-            raise InputError(
-                f"{where}: {name}: expected a number or {engine.num_envs}, got shape"
-                f" {numbers.shape}"
-            )
-        largest = {"heading_error": np.pi, "rudder": engine.model.steering.limit}
-        if name in largest and (np.abs(numbers) > largest[name]).any():
-            raise InputError(
-                f"{where}: {name}: expected at most {largest[name]:g} rad to each side,"
-                f" got {np.abs(numbers).max():g}"
-            )
-        rows[name] = np.broadcast_to(numbers, (engine.num_envs,))
-    return rows
+        columns[name] = _column(engine, name, values)
+    return columns
+
+
+def _column(engine: Engine, name: str, values: Any) -> Any:
+    """Numbers of a name, one for each lane."""
+    where = f"options: start: {name}"
+    numbers = check_finite(values, where)
+    shape = (engine.num_envs,)
+    if numbers.shape not in ((), shape):
+        count = engine.num_envs
+        found = numbers.shape
+        raise InputError(f"{where}: expected a number or {count}, got shape {found}")
+    limit = np.inf
+    if name == "heading_error":
+        limit = np.pi
+    elif name == "rudder":
+        limit = engine.model.steering.limit
+    sizes = np.abs(numbers)
+    largest = sizes.max()
+    if largest > limit:
+        raise InputError(
+            f"{where}: expected at most {limit:g} rad to each side, got {largest:g}"
+        )
+    return np.broadcast_to(numbers, shape)
 
 
 def start_lane(memory: Any, output_memory: Any, number: int, start: Start) -> bool:
@@ -107,40 +121,52 @@ def start_lane(memory: Any, output_memory: Any, number: int, start: Start) -> bo
     at = load_arguments(np.frombuffer(memory, dtype=np.int64))
     tile = tile_of(memory, at, 0, number // LANES)
     lane = number % LANES
-    ship = load_ship(tile.ships, lane)
-    motion = load_motion(tile.state, lane)
-    state = load_task_state(tile.state, lane)
-    settings = settings_of(tile)
     clear_lane(tile.result, lane)
+    state = load_task_state(tile.state, lane)
+    motion = started(load_motion(tile.state, lane), state, start)
+    begins = begin_at(tile, lane, motion, state, start.heading_error)
+    observe_lane(tile, lane)
+    outputs = outputs_in(memory, output_memory, at)
+    write_outputs(tile, outputs, lane, lane + 1)
+    return begins
 
+
+def started(motion: Any, state: Any, start: Start) -> Any:
+    """Motion with the numbers of a start that are given, but for the heading."""
     asked = {"u": start.speed, "r": start.yaw_rate, "delta": start.rudder}
     for name, value in asked.items():
-        if value == value:  # not NaN
+        if not np.isnan(value):
             motion = motion._replace(**{name: value})
-    if start.cross_track == start.cross_track:
-        aside = start.cross_track - state.cross_track
-        motion = motion._replace(
-            x=motion.x - aside * state.leg.sine,
-            y=motion.y + aside * state.leg.cosine,
-        )
-    commands = load_commands(tile.state, lane)
+    if np.isnan(start.cross_track):
+        return motion
+    aside = start.cross_track - state.cross_track
+    return motion._replace(
+        x=motion.x - aside * state.leg.sine,
+        y=motion.y + aside * state.leg.cosine,
+    )
+
+
+def begin_at(
+    tile: Any, lane: int, motion: Any, state: Any, heading_error: float
+) -> bool:
+    """Store a motion with what task and memory make of it; whether it is a start."""
+    ship = load_ship(tile.ships, lane)
+    settings = settings_of(tile)
     order = motion.delta / ship.rudder_limit
-    store_commands(tile.state, lane, commands._replace(rudder_command=order))
+    commands = load_commands(tile.state, lane)
+    commands = commands._replace(rudder_command=order)
+    store_commands(tile.state, lane, commands)
     interval = last_interval(tile, lane)
     interval = interval._replace(dt=NO_TIME, rudder_before=motion.delta)
     given = (interval, ship, settings.task, tile, lane)
     after, _, failed, arrived = task_step(motion, state, *given)
-    if start.heading_error == start.heading_error:
-        motion = motion._replace(psi=after.heading_setpoint - start.heading_error)
+    if not np.isnan(heading_error):
+        motion = motion._replace(psi=after.heading_setpoint - heading_error)
         after, _, failed, arrived = task_step(motion, state, *given)
 
     store_motion(tile.state, lane, motion)
     store_task(tile, lane, after)
-    store_memory(
-        tile.state,
-        lane,
-        sample(tile, lane, motion, last_interval(tile, lane), settings),
-    )
-    observe_lane(tile, lane)
-    write_outputs(tile, outputs_in(memory, output_memory, at), lane, lane + 1)
+    interval = last_interval(tile, lane)
+    seen = sample(tile, lane, motion, interval, settings)
+    store_memory(tile.state, lane, seen)
     return not (failed or arrived or lost(motion, ship))

@@ -65,7 +65,8 @@ def check_once(model: ShipModel, task: Task, randomisation: Randomisation) -> No
     if not (program.users_code and task.checked):
         return
     content = fingerprint(episodes.run, program.hooks)
-    known = cached_path(content, repr((model.name, task.settings, task.options)))
+    asked_for = (model.name, task.settings, task.options)
+    known = cached_path(content, repr(asked_for))
     mark = known.with_suffix(".sound") if known else None
     if mark and mark.exists():
         return
@@ -105,7 +106,7 @@ def _checked(model: ShipModel, given: Task, randomisation: Randomisation) -> Tas
     )
     problems = [*_not_finite(many), *compiled_and_plain, *many_and_one]
     remarks = [*_often_clipped(given, seen), *_printed(many)]
-    remarks += list(_positive(many)) or list(_hard_to_learn(many))
+    remarks += list(_positive(many)) or _hard_to_learn(many)
     return TaskCheck(given.name, tuple(problems), tuple(remarks))
 
 
@@ -175,7 +176,8 @@ def _not_finite(engine: Engine) -> Iterator[str]:
     """Numbers of reward, state and observations that are not finite, each once."""
     observations = engine.reset(np.arange(engine.num_envs))
     found: set[str] = set()
-    for step in range(min(STEPS, engine.task.episode_steps) + 1):
+    steps = min(STEPS, engine.task.episode_steps)
+    for step in range(steps + 1):
         if step > 0:
             observations, *_ = engine.step(_orders(engine, step - 1))
         for name, values in _numbers(engine, observations).items():
@@ -183,10 +185,11 @@ def _not_finite(engine: Engine) -> Iterator[str]:
             if name in found or not wrong.any():
                 continue
             found.add(name)
+            source = _source_of(name, engine.task)
             lane = int(np.argmax(wrong))
             yield (
-                f"{_source_of(name, engine.task)}: {name}: expected a finite number,"
-                f" got {values[lane]} in lane {lane} at step {step}"
+                f"{source}: {name}: expected a finite number, got {values[lane]} in"
+                f" lane {lane} at step {step}"
             )
 
 
@@ -329,59 +332,70 @@ def _sailed_at_random(engine: Engine) -> _Sailed:
     Each order is held for twenty control intervals.
     """
     held = 20
+    task = engine.task
     random = np.random.default_rng(0)
     n_ships = engine.num_envs
-    shape = (n_ships, engine.task.n_commands)
     sailing = np.ones(n_ships, dtype=np.bool_)
     engine.reset(np.arange(n_ships))
 
     earned = []
     parts = []
-    for step in range(engine.task.episode_steps):
+    for step in range(task.episode_steps):
         if step % held == 0:
-            orders = random.uniform(-1.0, 1.0, shape)
+            orders = random.uniform(-1.0, 1.0, (n_ships, task.n_commands))
         _, rewards, terminated, truncated = engine.step(orders)
         earned.append(rewards[sailing])
         parts.append(engine.reward_parts[sailing])
         sailing &= ~(terminated | truncated)
         if not sailing.any():
             break
+    all_earned = np.concatenate(earned)
     all_parts = np.concatenate(parts)
-    is_lost = bool((all_parts[:, -1] < 0.0).any())
-    return _Sailed(np.concatenate(earned), all_parts, is_lost)
+    losses = all_parts[:, -1]
+    return _Sailed(all_earned, all_parts, lost=bool((losses < 0.0).any()))
 
 
-def _hard_to_learn(engine: Engine) -> Iterator[str]:
+def _hard_to_learn(engine: Engine) -> list[str]:
     """Remark on rewards of which most lies in rare events, or that hardly differ."""
+    sailed = _sailed_at_random(engine)
+    scale = engine.task.half_reward_cost
+    remarks = _mostly_rare(sailed, is_bounded=scale > 0.0)
+    if scale > 0.0:
+        least_reward = engine.task.definition.perfect_step - 1.0
+        remarks += _faint(sailed.rewards, least_reward, scale)
+    return remarks
+
+
+def _mostly_rare(sailed: _Sailed, *, is_bounded: bool) -> list[str]:
     most = 0.2  # share of all reward in rare events that learners cope with
-    faint = 0.02  # bounded reward that most steps should earn
-    rewards, _, lost = _sailed_at_random(engine)
-    size = np.abs(rewards)
+    size = np.abs(sailed.rewards)
     median = float(np.median(size))
     is_large = size > RARE * median
-    rare_share = float(size[is_large].sum() / max(size.sum(), 1e-300))
-    largest = float(rewards[size.argmax()])
-    if rare_share > most and is_large.mean() < SELDOM:
-        is_bounded = engine.task.half_reward_cost > 0.0
-        remedy = (
-            "give a larger scale as bounded" if is_bounded else "leave bounded=True"
-        )
-        remedy += ", or lower loss_horizon" if lost else ""
-        yield (
-            f"reward: expected at most {100.0 * most:.0f} % of all reward in steps of"
-            f" more than {RARE:g} times the median, {median:.3g}, got"
-            f" {100.0 * rare_share:.0f} % under random orders, in one step"
-            f" {largest:.4g}: one event drowns the rest; {remedy}"
-        )
+    all_reward = max(size.sum(), 1e-300)
+    rare_share = float(size[is_large].sum() / all_reward)
+    largest = float(sailed.rewards[size.argmax()])
+    if rare_share <= most or is_large.mean() >= SELDOM:
+        return []
+    remedy = "give a larger scale as bounded" if is_bounded else "leave bounded=True"
+    if sailed.lost:
+        remedy += ", or lower loss_horizon"
+    return [
+        f"reward: expected at most {100.0 * most:.0f} % of all reward in steps of"
+        f" more than {RARE:g} times the median, {median:.3g}, got"
+        f" {100.0 * rare_share:.0f} % under random orders, in one step"
+        f" {largest:.4g}: one event drowns the rest; {remedy}"
+    ]
 
-    scale = engine.task.half_reward_cost
-    least_reward = engine.task.definition.perfect_step - 1.0
+
+def _faint(rewards: Floats, least_reward: float, scale: float) -> list[str]:
+    faint = 0.02  # bounded reward that most steps should earn
     above_least = float(np.median(rewards)) - least_reward
-    if scale > 0.0 and above_least < faint:
-        cost = scale / max(above_least, 1e-9) - scale
-        yield (
-            f"reward: expected a median of {faint:g} above the least reward under"
-            f" random orders, got {above_least:.2g}: a step costs {cost:.3g}, which"
-            f" earns next to nothing with bounded={scale:g}; give a tenth of that cost"
-            " as bounded"
-        )
+    if above_least >= faint:
+        return []
+    cost = scale / max(above_least, 1e-9) - scale
+    return [
+        f"reward: expected a median of {faint:g} above the least reward under"
+        f" random orders, got {above_least:.2g}: a step costs {cost:.3g}, which"
+        f" earns next to nothing with bounded={scale:g}; give a tenth of that cost"
+        " as bounded"
+    ]

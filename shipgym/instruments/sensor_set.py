@@ -67,4 +67,5 @@ def shipped_sensors(windy: bool, noise: bool, filtered: bool) -> SensorSet:
 
         sensors = _sensors_of(bridge, str(bridge.__file__))
         return replace(sensors, noise=noise, filter=filtered)
-    return _sensors_of(perfect, str(perfect.__file__))
+    place = str(perfect.__file__)
+    return _sensors_of(perfect, place)

@@ -94,7 +94,8 @@ def imo_criteria(
         criteria[criterion] = criterion_of(rule, sides, trial)
     stop = found.get(STOPPING.manoeuvre)
     criteria["stopping"] = stopping_criterion(model, stop)
-    return with_measured(criteria, measured_in_file(model))
+    measured = measured_in_file(model)
+    return with_measured(criteria, measured)
 
 
 def stopping_criterion(

@@ -115,7 +115,8 @@ def _refuse_without_reversal(
     model: ShipModel, trial: Trial, rudder_deg: float, heading_deg: float
 ) -> None:
     psi = trial["psi"]
-    side = np.sign(trial["delta_command"][0])
+    ordered = trial["delta_command"]
+    side = np.sign(ordered[0])
     changes = side * (psi - psi[0])
     largest_deg = np.degrees(changes.max())
     raise ManoeuvreError(
@@ -170,7 +171,8 @@ def _initial_turning(
     when = reached(change, threshold, times)
     if when is None:
         return None
-    before, then = np.interp([start, when], t, distance_sailed(trial))
+    sailed = distance_sailed(trial)
+    before, then = np.interp([start, when], t, sailed)
     return float(then - before) / length
 
 

@@ -204,7 +204,8 @@ def _read_reference(
     """Read the reference ship of a grey box."""
     place = f"{where}.reference"
     with placed(place):
-        fields = check_table(table.get("reference"), place)
+        given = table.get("reference")
+        fields = check_table(given, place)
         return read_model(fields, place, make)
 
 

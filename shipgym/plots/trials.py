@@ -79,9 +79,9 @@ def history_figure(
     histories = [_history(trials, name) for name in channels]
     shown = [panel for panel in histories if panel.traces]
     if not shown:
+        names = ", ".join(channels)
         raise InputError(
-            f"figure: expected a trial with any of the channels {', '.join(channels)},"
-            " got none"
+            f"figure: expected a trial with any of the channels {names}, got none"
         )
     grid = {"shared_xaxes": True, "vertical_spacing": 0.16 / len(shown)}
     row_height = 150  # of one channel's time history, pixels

@@ -112,7 +112,8 @@ class GreyBox(Structure):
             needed.add("phi")
         if self.shaft:
             needed.add("n")
-        return tuple(name for name in MEASURED if name in needed)
+        in_order = [name for name in MEASURED if name in needed]
+        return tuple(in_order)
 
     @property
     def has_rudder(self) -> bool:

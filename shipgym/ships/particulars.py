@@ -165,10 +165,11 @@ class Particulars(Mapping[str, Any]):
             raise unexpected("estimated", "a list of names of values", names)
         object.__setattr__(self, "estimated", frozenset(names))
         # what was given is held against what was given alone
-        given = {
-            name: value for name, value in numbers.items() if name not in self.estimated
-        }
-        check_together({**given, "length": numbers["length"]})
+        given = {"length": numbers["length"]}
+        for name, value in numbers.items():
+            if name not in names:
+                given[name] = value
+        check_together(given)
 
     def __getitem__(self, name: str) -> Any:
         if name not in NAMES:

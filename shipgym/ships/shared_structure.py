@@ -189,8 +189,10 @@ def _fields(name: Any, source: Any, texts: Mapping[str, str]) -> dict[str, Any]:
                     f"{axis}: expected 'udot' in the equation of surge, 'vdot' and"
                     f" 'rdot' in those of sway and yaw, got '{share.acceleration}'"
                 )
-    surge = _distinct([*on_velocities["u"], VR, RR])
-    across = _distinct([*on_velocities["v"], *on_velocities["r"], UR])
+    ahead = on_velocities["u"]
+    aside = on_velocities["v"] + on_velocities["r"]
+    surge = _distinct([*ahead, VR, RR])
+    across = _distinct([*aside, UR])
     return {
         "name": name,
         "source": source,

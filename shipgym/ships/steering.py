@@ -43,8 +43,9 @@ class SteeringGear:
             "rudder_rate_deg_s": {"above": 0.0},
             "time_constant": {"at_least": 0.0},
         }
-        for name, allowed in bounds.items():
+        for name in bounds:
             value = getattr(self, name)
+            allowed = bounds[name]
             number = check_number(value, name, **allowed)
             object.__setattr__(self, name, number)
 

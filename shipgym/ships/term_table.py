@@ -435,7 +435,8 @@ class Structure:
 def structure_fields(table: Mapping[str, Any], where: str) -> dict[str, Any]:
     """Fields of a `Structure` from a model file."""
     place = f"{where}.equations"
-    lists = check_table(table.get("equations"), place, EQUATION_NAMES)
+    given = table.get("equations")
+    lists = check_table(given, place, EQUATION_NAMES)
     equations = {}
     for equation, terms in lists.items():
         equations[equation] = read_term_list(terms, f"{place}.{equation}")
@@ -460,10 +461,10 @@ def _check_structure(table: Structure) -> None:
     where = f"structure '{table.name}'"
     check_text(table.name, "structure: name")
     check_text(table.source, f"{where}: source")
-    check_choice(
-        table.normalisation, ("prime", "service", "si"), f"{where}: normalisation"
-    )
-    check_choice(table.quantity, ("force", "acceleration"), f"{where}: quantity")
+    normalisations = ("prime", "service", "si")
+    check_choice(table.normalisation, normalisations, f"{where}: normalisation")
+    quantities = ("force", "acceleration")
+    check_choice(table.quantity, quantities, f"{where}: quantity")
     known = [equation for equation in EQUATION_NAMES if equation in equations]
     if not known or list(equations) != known:
         raise InputError(

@@ -286,6 +286,10 @@ class Task:
                 f" {model.name!r}, got {self.action!r}"
             )
 
+        self._check_definition(model)
+
+    def _check_definition(self, model: ShipModel) -> None:
+        """Ask the task itself, and for scales and a plan that fit the ship."""
         source = self.definition.source
         asked(self.definition.check, self.settings, model)
         for quantity in self.observed(model):

@@ -30,11 +30,10 @@ def check_cut(cut: Any, where: str) -> None:
     """Refuse a cut that is neither "rudder" nor a list of pairs of numbers or texts."""
     if cut == "rudder":
         return
-    pairs = cut if isinstance(cut, list) and cut else [None]
-    for pair in pairs:
-        if not _is_stretch(pair):
-            found = shown(cut)
-            raise InputError(f"{where} cut: {_EXPECTED}, got {found}")
+    is_list = isinstance(cut, list) and len(cut) > 0
+    if not is_list or not all(_is_stretch(pair) for pair in cut):
+        found = shown(cut)
+        raise InputError(f"{where} cut: {_EXPECTED}, got {found}")
 
 
 def _is_stretch(pair: Any) -> bool:

@@ -136,7 +136,7 @@ def _check_holes(t: Floats, is_missing: Flags, channel: str, locator: Locator) -
     if not too_long.any():
         return
 
-    k = np.argmax(too_long)
+    k = int(too_long.argmax())
     place = locator.place(first[k], channel)
     span = locator.in_file("t", spans[k])
     raise InputError(

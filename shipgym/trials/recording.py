@@ -122,8 +122,7 @@ def read_recording(
 def _check_pairs(table: LogTable, chosen: Mapping[str, Column]) -> None:
     """Refuse one channel of a pair without the other."""
     for name, other in _PAIRS.items():
-        is_alone = name in chosen and other not in chosen
-        if is_alone:
+        if name in chosen and other not in chosen:
             raise InputError(
                 f"{table.path}: columns: expected {name} and {other}, got {name} alone;"
                 " name the column of the other"

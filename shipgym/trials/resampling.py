@@ -85,7 +85,8 @@ def have_own_clocks(t: Floats, channels: Mapping[str, Floats]) -> bool:
     is_present = np.isfinite(list(channels.values()))
     has_value = is_present.any(axis=0)
     has_time = np.isfinite(t)
-    if not np.all(has_time & has_value):
+    is_whole = has_time & has_value
+    if not is_whole.all():
         return False
     for of_channel in is_present:
         rows = np.flatnonzero(of_channel)

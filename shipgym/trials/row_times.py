@@ -50,18 +50,7 @@ def read_times(table: LogTable, column: Column) -> RowTimes:
     Raises InputError for the first cell that is no time.
     """
     is_week_time = column.unit.startswith("gps tow")
-    is_plain = table.plain_numbers(column.name) is not None
-    may_be_compact = _COMPACT.fullmatch(table.first_text(column.name)) is not None
-    if is_plain and column.date is None and not may_be_compact:
-        cells = [table.first_text(column.name)]  # the rest need not be read as texts
-    else:
-        cells = table.texts(column.name)
-    if column.date is not None and not is_week_time:
-        dates = table.texts(column.date)
-        for row, date in enumerate(dates):
-            moment = f"{_day(date)} {cells[row]}"
-            cells[row] = moment.strip()
-
+    cells = _time_cells(table, column, is_week_time)
     notes: list[str] = []
     if _are_unpadded(cells):
         cells = [_padded(cell) for cell in cells]
@@ -76,12 +65,7 @@ def read_times(table: LogTable, column: Column) -> RowTimes:
         cells = [_parted(cell) for cell in cells]
         notes.append(f"column '{column.name}' is the clock without colons, hhmmss")
     if is_numeric:
-        numbers = table.numbers(column.name)
-        clock = si_factor("t", column.unit) * numbers
-        if column.nanoseconds is not None:
-            clock = clock + 1e-9 * table.numbers(column.nanoseconds)
-        if column.unit in ("excel days", "excel days 1904", "matlab days"):
-            clock = np.round(clock, 3)  # days have some nine decimals
+        clock = _numeric_clock(table, column)
     else:
         clock = _read_clock_cells(table, column, cells)
     if is_week_time:
@@ -96,6 +80,35 @@ def read_times(table: LogTable, column: Column) -> RowTimes:
     zero = float(known[0]) if known.size else 0.0
     ahead = zone_seconds(column.zone, str(table.path))
     return RowTimes(clock - zero, unit="s", start=zero - ahead, notes=notes)
+
+
+def _time_cells(table: LogTable, column: Column, is_week_time: bool) -> list[str]:
+    """Texts of the times, behind their dates; of plain numbers the first alone."""
+    first = table.first_text(column.name)
+    is_plain = table.plain_numbers(column.name) is not None
+    may_be_compact = _COMPACT.fullmatch(first) is not None
+    if is_plain and column.date is None and not may_be_compact:
+        return [first]
+    cells = table.texts(column.name)
+    if column.date is None or is_week_time:
+        return cells
+    dates = table.texts(column.date)
+    moments = []
+    for date, cell in zip(dates, cells, strict=True):
+        moment = f"{_day(date)} {cell}"
+        moments.append(moment.strip())
+    return moments
+
+
+def _numeric_clock(table: LogTable, column: Column) -> Floats:
+    """Times that are numbers, s from the zero of their unit."""
+    numbers = table.numbers(column.name)
+    clock = si_factor("t", column.unit) * numbers
+    if column.nanoseconds is not None:
+        clock = clock + 1e-9 * table.numbers(column.nanoseconds)
+    if column.unit in ("excel days", "excel days 1904", "matlab days"):
+        clock = np.round(clock, 3)  # days have some nine decimals
+    return clock
 
 
 def _are_unpadded(cells: list[str]) -> bool:

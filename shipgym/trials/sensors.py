@@ -64,9 +64,11 @@ class Sensor:
         if self.drift:
             wander = _gauss_markov(times, self.drift_time_s, rng)
             reading += self.drift * wander
-        reading += self.noise * rng.standard_normal(n)
+        noise = rng.standard_normal(n)
+        reading += self.noise * noise
 
-        is_outlier = rng.random(n) < self.outlier_probability
+        chance = rng.random(n)
+        is_outlier = chance < self.outlier_probability
         outlier = self.outlier_size * rng.standard_normal(n)
         reading += np.where(is_outlier, outlier, 0.0)
         if self.resolution:
@@ -180,7 +182,8 @@ class Sensors:
         if self.sampling_s is None:
             return trial.t.copy()
         rounding = 1.0 + 1e-12
-        steps = rounding * trial.duration / self.sampling_s
+        longest = rounding * trial.duration
+        steps = longest / self.sampling_s
         count = int(steps) + 1
         if count < FEWEST_SAMPLES:
             raise InputError(

@@ -154,11 +154,10 @@ def _own_conventions(
     own = {key: table[key] for key in _CONVENTIONS if key in table}
     installation = shared.conventions.installation
     if "sensors" in table:
-        own_sensors = check_table(table["sensors"], f"{where} sensors")
+        place = f"{where} sensors"
+        own_sensors = check_table(table["sensors"], place)
         sensors = {**shared.sensors, **own_sensors}
-        installation = Installation.from_mapping(
-            sensors, f"{where} sensors", shared.ship
-        )
+        installation = Installation.from_mapping(sensors, place, shared.ship)
     return replace(shared.conventions, where=where, installation=installation, **own)
 
 

@@ -200,7 +200,8 @@ def _check_motion(
     locator = recordings[0].locator
     has_positions = False
     for recording in recordings:
-        has_positions |= "lat" in recording.locator.columns
+        columns = recording.locator.columns
+        has_positions |= "lat" in columns
 
     remarks = []
     if not log.has("delta") and not log.has("delta_command") and not log.has("X"):

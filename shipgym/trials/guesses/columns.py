@@ -251,12 +251,7 @@ def _unit_where_fitting(table: LogTable, column: str, channel: str) -> UnitGuess
     """Unit of a column, were it a channel's; None where it is of another quantity."""
     text = _spaced(column)
     units = split_unit(text).units
-    if names_another_quantity(units, channel):
-        return None
-    words = {*re.findall(r"[^\W\d_]+", text)}
-    if words & _OTHER_QUANTITY or _ASKED_FOR.search(text):
-        return None
-    if channel in ("psi", "sog", "stw", "cog") and _NO_MEASUREMENT & words:
+    if names_another_quantity(units, channel) or _is_no_measurement(text, channel):
         return None
     unit = named_unit(units, channel)
     unknown = None if unit else unknown_unit(column.lower())
@@ -274,6 +269,20 @@ def _unit_where_fitting(table: LogTable, column: str, channel: str) -> UnitGuess
         unit = UnitGuess(glued[1]) if glued else None
     if unit is not None and (channel != "t" or _is_duration(table, column, unit)):
         return unit
+    return _unit_by_cells(table, column, channel)
+
+
+def _is_no_measurement(name: str, channel: str) -> bool:
+    """Return whether words of a name are those of another quantity, or of an order."""
+    words = {*re.findall(r"[^\W\d_]+", name)}
+    if words & _OTHER_QUANTITY or _ASKED_FOR.search(name):
+        return True
+    may_be_ordered = channel in ("psi", "sog", "stw", "cog")
+    return may_be_ordered and not words.isdisjoint(_NO_MEASUREMENT)
+
+
+def _unit_by_cells(table: LogTable, column: str, channel: str) -> UnitGuess:
+    """Unit of a column whose name tells none, by its recorder or its values."""
     if _SIGNAL_K.match(column) and channel not in ("t", "lat", "lon"):
         size = unit_by_size(None, channel)
         return size._replace(reason="paths of Signal K are in SI units")
@@ -327,11 +336,9 @@ def _is_duration(table: LogTable, column: str, unit: UnitGuess) -> bool:
     if values is None:
         return False
     by_size = unit_by_size(values, "t").unit
-    durations = ("s", "ms", "us", "ns")
-    counts_from_date = by_size == f"unix {unit.unit}"
     if unit.unit == "s":
-        counts_from_date = by_size not in durations
-    return not counts_from_date
+        return by_size in ("s", "ms", "us", "ns")
+    return by_size != f"unix {unit.unit}"
 
 
 def _unit_in_cells(table: LogTable, column: str, channel: str) -> UnitGuess | None:
@@ -418,7 +425,8 @@ def _forms(column: str, channel: str) -> list[str]:
     bare, units = split_unit(text)
     forms = [_plain(text)]
     if "(:," not in column:  # of a matrix
-        forms.append(_plain(re.sub(r"[\[(].*", "", text)))
+        before_bracket = re.sub(r"[\[(].*", "", text)
+        forms.append(_plain(before_bracket))
     if named_unit(units, channel) is not None:
         forms.append(_plain(bare))
     is_path = re.search(r"[^\W\d_][./:][^\W\d_]", column)

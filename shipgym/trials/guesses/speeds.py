@@ -47,17 +47,24 @@ def settle_speeds(
         if known is None and _is_known(guess):
             speed = _magnitudes(table, guess) * _UNITS.get(guess.unit, 1.0)
             known = _Known(speed, f"the column '{guess.column}', which shows")
-    if "sog" in settled and "cog" not in settled:
-        alone = settled.pop("sog")
-        if by_positions is None and "stw" not in settled and "u" not in settled:
-            reason = (
-                f"{alone.reason}; over ground by its name, taken as through the water,"
-                " as there is no course over ground"
-            )
-            settled["stw"] = alone._replace(channel="stw", reason=reason)
-    if "cog" in settled and "sog" not in settled:
-        settled.pop("cog")
+    _settle_alone(settled, has_positions=by_positions is not None)
     return settled
+
+
+def _settle_alone(settled: dict[str, ColumnGuess], *, has_positions: bool) -> None:
+    """Leave out a speed or course over ground without the other."""
+    if "sog" not in settled:
+        settled.pop("cog", None)
+        return
+    if "cog" in settled:
+        return
+    alone = settled.pop("sog")
+    if not has_positions and "stw" not in settled and "u" not in settled:
+        reason = (
+            f"{alone.reason}; over ground by its name, taken as through the water,"
+            " as there is no course over ground"
+        )
+        settled["stw"] = alone._replace(channel="stw", reason=reason)
 
 
 def _is_known(guess: ColumnGuess) -> bool:
@@ -120,8 +127,8 @@ def _settled(
     is_named = _is_known(guess)
     if known is None:
         return guess if is_named else _guessed(guess, values, is_si=is_si)
-    speed = float(np.median(known.speed)) if known.speed.size else 0.0
-    number = float(np.median(values)) if values.size else 0.0
+    speed = _middle(known.speed)
+    number = _middle(values)
     if not speed > 0.0 or not number > 0.0:
         return guess
 
@@ -135,6 +142,11 @@ def _settled(
     if is_named:
         reason += f", not {guess.unit} as its name or row of units says"
     return guess._replace(unit=nearest, reason=reason)
+
+
+def _middle(speeds: Floats) -> float:
+    """Median of speeds; 0 where there are none."""
+    return float(np.median(speeds)) if speeds.size else 0.0
 
 
 def _guessed(guess: ColumnGuess, values: Floats, *, is_si: bool) -> ColumnGuess:

@@ -114,53 +114,75 @@ def guess_trial(path: str | Path, *others: str | Path) -> TrialGuess:
     it. Raises InputError, as the readers do, for other logs that cannot be read.
     """
     tables = [read_log(one) for one in (path, *others)]
-    columns: dict[str, ColumnGuess] = {}
-    decisions: list[Decision] = []
+    guesses = _Guesses(tables)
     if not all(_knows_channels(table) for table in tables):
-        columns, decisions = _guess_tables(tables)
-    conventions: dict[str, ConventionGuess] = {}
-    east = frame_by_names({name: one.column for name, one in columns.items()})
+        guesses.columns, guesses.decisions = _guess_tables(tables)
+    names = {channel: one.column for channel, one in guesses.columns.items()}
+    east = frame_by_names(names)
     if east is not None:
-        conventions["frame"] = ConventionGuess("frame", "enu", east)
-    tried: set[tuple[str, str]] = set()
-    trial = None
-    while trial is None and not any(one.section != "sensors" for one in decisions):
-        try:
-            trial = _read(tables, columns, conventions, decisions)
-        except InputError as error:
-            proposal = _next_proposal(error, columns, tried)
-            if proposal is None:
-                decisions.append(_decision(error, decisions))
-                continue
-            tried.add(proposal)
-            name, value = proposal
-            if name in columns:
-                columns[name] = _with_unit(columns[name], value)
-            else:
-                reason = "without it the log is refused"
-                conventions[name] = ConventionGuess(name, value, reason)
-
+        guesses.take_convention("frame", "enu", east)
+    trial = _trial_by_proposals(guesses)
     side = None
     if trial is None:
-        conventions = {}
+        guesses.conventions = {}
     else:
-        is_turned = "rudder_positive" in conventions
-        rudder = columns.get("delta") or columns.get("delta_command")
-        side = _rudder_side(tables, trial, rudder, is_turned=is_turned)
+        is_turned = "rudder_positive" in guesses.conventions
+        side = _rudder_side(guesses, trial, is_turned=is_turned)
         if side is not None and side.side == "port" and not is_turned:
-            turned = ConventionGuess("rudder_positive", "port", side.reason)
-            conventions["rudder_positive"] = turned
-            trial = _read(tables, columns, conventions, decisions)
-        conventions.pop("rudder_positive", None)
+            guesses.take_convention("rudder_positive", "port", side.reason)
+            trial = _read(guesses)
+        guesses.conventions.pop("rudder_positive", None)
+    unused = []
+    for table in tables:
+        unused += _unused(table, guesses.columns)
     return TrialGuess(
         paths=tuple(table.path for table in tables),
-        columns=list(columns.values()),
-        conventions=list(conventions.values()),
+        columns=list(guesses.columns.values()),
+        conventions=list(guesses.conventions.values()),
         trial=trial,
-        unused=[name for table in tables for name in _unused(table, columns)],
+        unused=unused,
         side=side,
-        decisions=decisions,
+        decisions=guesses.decisions,
     )
+
+
+@dataclass
+class _Guesses:
+    """Tables of a log, and the guesses so far with which they are read."""
+
+    tables: Sequence[LogTable]
+    columns: dict[str, ColumnGuess] = field(default_factory=dict)
+    conventions: dict[str, ConventionGuess] = field(default_factory=dict)
+    decisions: list[Decision] = field(default_factory=list)
+
+    def take_convention(self, name: str, value: str, reason: str) -> None:
+        """Read the log with a convention from now on."""
+        self.conventions[name] = ConventionGuess(name, value, reason)
+
+    def take_proposal(self, name: str, value: str) -> None:
+        """Read the log with a unit or a convention that a check proposed."""
+        column = self.columns.get(name)
+        if column is not None:
+            self.columns[name] = _with_unit(column, value)
+        else:
+            self.take_convention(name, value, "without it the log is refused")
+
+
+def _trial_by_proposals(guesses: _Guesses) -> Trial | None:
+    """Read a log, with what its checks propose; None where there is to decide first."""
+    tried: set[tuple[str, str]] = set()
+    while all(one.section == "sensors" for one in guesses.decisions):
+        try:
+            return _read(guesses)
+        except InputError as error:
+            proposal = _next_proposal(error, guesses.columns, tried)
+            if proposal is None:
+                decision = _decision(error, guesses.decisions)
+                guesses.decisions.append(decision)
+            else:
+                tried.add(proposal)
+                guesses.take_proposal(*proposal)
+    return None
 
 
 def _knows_channels(table: LogTable) -> bool:
@@ -180,21 +202,17 @@ def _guess_tables(
         decisions += _unknown_units(found)
         settled = settle_speeds(table, found)
         for channel, guess in settled.items():
-            reason = guess.reason
             if len(tables) > 1 and channel != "t":
-                reason += f"; from {table.path.name}"
-            columns.setdefault(channel, guess._replace(reason=reason))
+                reason = f"{guess.reason}; from {table.path.name}"
+                guess = guess._replace(reason=reason)
+            columns.setdefault(channel, guess)
     asked = {one.key for one in decisions}
     decisions += _missing_columns(tables, columns, asked)
     return columns, decisions
 
 
 def _rudder_side(
-    tables: Sequence[LogTable],
-    trial: Trial,
-    column: ColumnGuess | None,
-    *,
-    is_turned: bool,
+    guesses: _Guesses, trial: Trial, *, is_turned: bool
 ) -> RudderSide | None:
     """Side of the rudder in a log that was read, `is_turned` with positive to port.
 
@@ -203,7 +221,9 @@ def _rudder_side(
     rudder = trial.channels.get("delta", trial.channels.get("delta_command"))
     if "psi" not in trial or rudder is None:
         return None
-    for table in tables:
+    columns = guesses.columns
+    column = columns.get("delta") or columns.get("delta_command")
+    for table in guesses.tables:
         if column is None or column.column not in table.cells:
             continue
         first = table.first_text(column.column)
@@ -227,7 +247,8 @@ def _unused(table: LogTable, columns: Mapping[str, ColumnGuess]) -> list[str]:
     for guess in columns.values():
         used.add(guess.column)
         for _, value in guess.extra:
-            used.update(value if isinstance(value, tuple) else [str(value)])
+            names = value if isinstance(value, tuple) else [str(value)]
+            used.update(names)
     known = used or QUANTITIES.keys()
     return [name for name in table.header if name not in known]
 
@@ -316,48 +337,45 @@ def _behaves(channel: str, values: Floats) -> bool:
 def _decision(error: InputError, decisions: list[Decision]) -> Decision:
     """The decision that a refusal leaves to the user; the error where it is none."""
     message = str(error)
-    if "clock_offsets" in message and not decisions:
-        return Decision("sensors", "clock_offsets", f'"correct" or "keep": {message}')
-    if "clock_offsets" in message or not any(cure in message for cure in _CURABLE):
+    of_clock = "clock_offsets" in message
+    is_curable = any(cure in message for cure in _CURABLE)
+    if of_clock and not decisions:
+        choices = f'"correct" or "keep": {message}'
+        return Decision("sensors", "clock_offsets", choices)
+    if of_clock or not is_curable:
         raise error
-    return Decision(
-        "trials", "use", f'"fit" once this is settled, or "skip": {message}'
-    )
+    choices = f'"fit" once this is settled, or "skip": {message}'
+    return Decision("trials", "use", choices)
 
 
-def _read(
-    tables: Sequence[LogTable],
-    guesses: Mapping[str, ColumnGuess],
-    conventions: Mapping[str, ConventionGuess],
-    decisions: list[Decision],
-) -> Trial:
+def _read(guesses: _Guesses) -> Trial:
     """Read a log with the guesses so far."""
+    tables = guesses.tables
     columns = {}
-    for channel, guess in guesses.items():
+    for channel, guess in guesses.columns.items():
         columns[channel] = guess.as_column
     words: dict[str, Any] = {"where": f"{tables[0].path}:"}
-    for one in conventions.values():
+    for one in guesses.conventions.values():
         words[one.name] = one.value
-    if any(one.key == "clock_offsets" for one in decisions):
+    if any(one.key == "clock_offsets" for one in guesses.decisions):
         words["installation"] = Installation(clock_offsets="keep")
-    log = import_tables(
-        tables,
-        columns or None,
-        Conventions(**words),
-    )
-    return trial_of(log, " + ".join(table.path.name for table in tables))
+    conventions = Conventions(**words)
+    log = import_tables(tables, columns or None, conventions)
+    files = [table.path.name for table in tables]
+    return trial_of(log, " + ".join(files))
 
 
 def _next_proposal(
     error: InputError, columns: Mapping[str, ColumnGuess], tried: set[tuple[str, str]]
 ) -> tuple[str, str] | None:
     """First proposal of a refusal that was not tried and is no unit given by a name."""
-    for name, value in error.instead:
+    for proposal in error.instead:
+        name, _ = proposal
         may_be_tried = name not in QUANTITIES  # a convention
         if name in columns:
             may_be_tried = not columns[name].is_named
-        if may_be_tried and (name, value) not in tried:
-            return name, value
+        if may_be_tried and proposal not in tried:
+            return proposal
     return None
 
 

@@ -194,7 +194,8 @@ def _at_windows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 def _without_trend(t: Floats, values: Floats) -> Floats:
     """Values at the windows' edges without their line: a rate sensor has a bias."""
-    time = _at_windows(t - t[0])
+    since_start = t - t[0]
+    time = _at_windows(since_start)
     at_edges = _at_windows(values)
     line = np.polyfit(time, at_edges, deg=1)
     trend = np.polyval(line, time)

@@ -201,13 +201,7 @@ def without_clock_jumps(t: Floats, x: Floats, y: Floats) -> tuple[Floats, list[s
     shifts = np.zeros_like(t)
     notes = []
     for row in np.flatnonzero(steps > max(5.0 * usual, 5.0)).tolist():
-        around = np.arange(max(row - 10, 0), min(row + 11, steps.size))
-        around = around[around != row]
-        with np.errstate(all="ignore"):
-            speed = float(np.median(moved[around] / steps[around]))
-            is_far_too_short = moved[row] < 0.2 * speed * steps[row]
-        as_usual = moved[row] < 2.0 * moved[around].max()
-        if not speed >= 1.0 or not as_usual or not is_far_too_short:
+        if not _hardly_moved(steps, moved, row):
             continue
         surplus = float(steps[row]) - usual
         shifts[row + 1 :] += surplus
@@ -216,3 +210,16 @@ def without_clock_jumps(t: Floats, x: Floats, y: Floats) -> tuple[Floats, list[s
             f" ship moved by {moved[row]:.2g} m meanwhile; that time is taken out"
         )
     return t - shifts, notes
+
+
+def _hardly_moved(steps: Floats, moved: Floats, row: int) -> bool:
+    """Return whether a ship with way on moved over a step as in any around it."""
+    around = np.arange(max(row - 10, 0), min(row + 11, steps.size))
+    around = around[around != row]
+    here = moved[row]
+    with np.errstate(all="ignore"):
+        speeds = moved[around] / steps[around]
+        speed = float(np.median(speeds))
+        is_far_too_short = here < 0.2 * speed * steps[row]
+    as_usual = here < 2.0 * moved[around].max()
+    return bool(speed >= 1.0 and as_usual and is_far_too_short)

@@ -44,12 +44,8 @@ def read_csv(path: Path, content: bytes) -> LogTable:
     _check_text(path, lines)
     layout = find_layout(lines) or _first_line(path, lines)
     delimiter = layout.delimiter
-    names = split(lines[layout.header], delimiter)
-    header = [name.strip() for name in names]
-    while len(header) > 2 and not header[-1]:
-        header.pop()
+    header = _names(lines, layout)
     header_at = layout.header + 1
-
     notes = []
     if encoding:
         notes.append(f"the text is in {encoding}, by the names of its columns")
@@ -57,8 +53,8 @@ def read_csv(path: Path, content: bytes) -> LogTable:
     notes += title_note(header_at, len(titles))
     unit_rows = [split(lines[number], delimiter) for number in layout.units]
     body = _find_rows(path, lines, layout, len(header))
-    as_texts = [k for k, name in enumerate(header) if "stamp" in name.lower()]
-    columns = _columns(list(body.lines.values()), delimiter, len(header), as_texts)
+    rows = list(body.lines.values())
+    columns = _columns(rows, delimiter, header)
     notes += _drop_stuck_doubles(header, columns)
     _check_header(path, header, header_at)
     return LogTable(
@@ -70,6 +66,15 @@ def read_csv(path: Path, content: bytes) -> LogTable:
         unit_row=unit_texts(header, unit_rows),
         notes=(*notes, *body.notes),
     )
+
+
+def _names(lines: Sequence[str], layout: Layout) -> list[str]:
+    """Names of the columns, without blank ones at the end."""
+    cells = split(lines[layout.header], layout.delimiter)
+    header = [cell.strip() for cell in cells]
+    while len(header) > 2 and not header[-1]:
+        header.pop()
+    return header
 
 
 def _find_rows(path: Path, lines: Sequence[str], layout: Layout, n_cells: int) -> _Body:
@@ -84,13 +89,15 @@ def _find_rows(path: Path, lines: Sequence[str], layout: Layout, n_cells: int) -
     rows: dict[int, str] = {}
     lacking: dict[int, int] = {}  # cells by line, less than none where there are more
     notes = []
-    for number, line in enumerate(lines[layout.header + 1 :], start=layout.header + 1):
+    last = len(lines) - 1
+    for number in range(layout.header + 1, len(lines)):
+        line = lines[number]
         is_names = line.strip() == names
         if number in layout.units or is_names or not line.strip(blank):
             continue
         cells = split(line, delimiter)
         found = len(without_spare(cells, n_cells))
-        is_last = number == len(lines) - 1
+        is_last = number == last
         is_remark = found < n_cells and not is_data(cells)
         if rows and (is_remark or (is_last and found < n_cells)):
             left_out = "is cut short" if is_last else "is no row of the table"
@@ -135,15 +142,14 @@ def _settle_lacking(
     )
 
 
-def _columns(
-    rows: list[str], delimiter: str, n_cells: int, as_texts: Sequence[int]
-) -> list[Any]:
+def _columns(rows: list[str], delimiter: str, header: Sequence[str]) -> list[Any]:
     """Columns of rows: numbers where all cells are plain ones, else texts.
 
-    Those of `as_texts` with a point stay texts: the digits behind it may be a count.
+    Stamps with a point stay texts: the digits behind it may be a count.
     """
     import pandas as pd
 
+    n_cells = len(header)
     if not rows:
         return [()] * n_cells
     text = "\n".join(rows)
@@ -153,6 +159,11 @@ def _columns(
     if is_of_digits or '"' in text:
         cells = [split(row, delimiter)[:n_cells] for row in rows]
         return list(zip(*cells, strict=True))
+    first = split(rows[0], delimiter)
+    as_texts = {}
+    for k, name in enumerate(header):
+        if "stamp" in name.lower() and "." in first[k]:
+            as_texts[k] = str
     frame = pd.read_csv(
         io.StringIO(text),
         sep=r"\s+" if delimiter == BLANKS else delimiter,
@@ -161,7 +172,7 @@ def _columns(
         keep_default_na=False,
         na_values=[""],
         low_memory=False,
-        dtype={k: str for k in as_texts if "." in split(rows[0], delimiter)[k]},
+        dtype=as_texts,
     )
     columns: list[Any] = []
     for _, column in frame.items():

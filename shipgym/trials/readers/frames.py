@@ -165,16 +165,21 @@ def _sheet(path: Path, content: bytes, parts: zipfile.ZipFile) -> Any:
         raise InputError(
             f"{path}: expected at most {_MOST_CELLS} cells, got more; save it as CSV"
         )
+    _refuse_merged(path, sheet, parts)
+    return pandas.DataFrame(sheet.iter_rows(values_only=True), dtype=object)
+
+
+def _refuse_merged(path: Path, sheet: Any, parts: zipfile.ZipFile) -> None:
     source = parts.read(sheet._worksheet_path)
     _, merged, after = source.partition(b'<mergeCell ref="')
     if merged:
-        cells = after.partition(b'"')[0].decode("ascii", "replace")
+        place, *_ = after.partition(b'"')
+        cells = place.decode("ascii", "replace")
         raise InputError(
             f"{path}: sheet {sheet.title!r}: expected a cell for each value, got merged"
             f" cells {cells}; unmerge them (Home, Merge & Center, Unmerge Cells), or"
             " save the table as CSV"
         )
-    return pandas.DataFrame(sheet.iter_rows(values_only=True), dtype=object)
 
 
 def _column_names(path: Path, cells: Any) -> list[str]:

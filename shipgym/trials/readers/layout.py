@@ -67,7 +67,8 @@ def _likely_delimiters(lines: Iterable[str]) -> list[str]:
     counts = Counter[str]()
     for line in lines:
         unquoted = re.sub('"[^"]*"', "", line)
-        counts.update(set(unquoted).intersection(delimiters))
+        used = set(unquoted).intersection(delimiters)
+        counts.update(used)
     likely = [one for one in delimiters if counts[one]]
     likely.sort(key=counts.__getitem__, reverse=True)
     if "\t" not in likely:

@@ -166,31 +166,38 @@ class LogTable:
         plain = self.plain_numbers(name)
         if plain is not None and np.isfinite(plain).all():
             return self
-        odd = self._parse(name, sided=False).odd
         texts = self.texts(name)
-        if len(odd) > ODD_SHARE * len(texts):  # clock times
-            odd = [row for row, text in enumerate(texts) if text and not _DIGIT(text)]
-        odd += [row for row, text in enumerate(texts) if not text]
+        odd = self._odd_times(name, texts)
         if not 0 < len(odd) <= max(1.0, ODD_SHARE * len(texts)):
             return self
-        left_out = set(odd)
-        kept = [row for row in range(len(texts)) if row not in left_out]
+        kept = np.delete(np.arange(len(texts)), odd).tolist()
         cells = {}
         for other, column in self.cells.items():
             is_array = isinstance(column, np.ndarray)
             cells[other] = column[kept] if is_array else [column[k] for k in kept]
-        place = self.cell(min(odd), name)
-        found = texts[min(odd)] or "nothing"
+        first = min(odd)
+        place = self.cell(first, name)
+        found = texts[first] or "nothing"
         note = f"{place}: {found!r} is no time, the row is left out{_and_more(odd)}"
         rows = [self.rows[k] for k in kept]
         return replace(self, cells=cells, rows=rows, notes=(*self.notes, note))
 
+    def _odd_times(self, name: str, texts: Sequence[str]) -> list[int]:
+        """Rows whose time is missing, or is neither a number nor a clock time."""
+        odd = list(self._parse(name, sided=False).odd)
+        if len(odd) > ODD_SHARE * len(texts):  # clock times
+            odd = [row for row, text in enumerate(texts) if text and not _DIGIT(text)]
+        missing = [row for row, text in enumerate(texts) if not text]
+        return odd + missing
+
     def _parse(self, name: str, *, sided: bool) -> _Parsed:
         """Numbers of a column and its odd rows, worked out once."""
         key = (name, sided)
-        if key not in self._parsed:
-            self._parsed[key] = self._parse_cells(name, sided=sided)
-        return self._parsed[key]
+        known = self._parsed.get(key)
+        if known is None:
+            known = self._parse_cells(name, sided=sided)
+            self._parsed[key] = known
+        return known
 
     def _parse_cells(self, name: str, *, sided: bool) -> _Parsed:
         plain = self.plain_numbers(name)

@@ -45,19 +45,7 @@ def read_matlab(path: Path, content: bytes) -> LogTable:
     Those of a matrix are numbered: ``simdata(:,2)``. Raises InputError for a damaged or
     large file, one of version 7.3, one without vectors, and complex numbers.
     """
-    header = content[:_HEADER_BYTES]
-    if content.startswith(b"\x89HDF\r\n\x1a\n") or b"MATLAB 7.3" in header:
-        raise InputError(
-            f"{path}: expected a MATLAB file of version 5 to 7, got MATLAB 7.3 (HDF5);"
-            " save(..., '-v7')"
-        )
-    vectors: dict[str, Any] = {}
-    remedy = "save the vectors again with save(..., '-v7')"
-    with damage_reported(path, "MATLAB (.mat)", remedy):
-        order = "<" if header.endswith(b"IM") else ">"
-        matrices = _matrices(path, content[_HEADER_BYTES:], order)
-        for matrix in islice(matrices, _MOST_MATRICES):
-            vectors |= _vectors(path, matrix, order)
+    vectors = _all_vectors(path, content)
     lengths = [values.size for values in vectors.values()]
     length = max(lengths, key=lengths.count, default=0)
     if not length:
@@ -70,6 +58,24 @@ def read_matlab(path: Path, content: bytes) -> LogTable:
         cells={name: one for name, one in vectors.items() if one.size == length},
         rows=range(1, length + 1),
     )
+
+
+def _all_vectors(path: Path, content: bytes) -> dict[str, Any]:
+    """Numeric vectors of a file by their names."""
+    header = content[:_HEADER_BYTES]
+    if content.startswith(b"\x89HDF\r\n\x1a\n") or b"MATLAB 7.3" in header:
+        raise InputError(
+            f"{path}: expected a MATLAB file of version 5 to 7, got MATLAB 7.3 (HDF5);"
+            " save(..., '-v7')"
+        )
+    vectors: dict[str, Any] = {}
+    order = "<" if header.endswith(b"IM") else ">"
+    remedy = "save the vectors again with save(..., '-v7')"
+    with damage_reported(path, "MATLAB (.mat)", remedy):
+        matrices = _matrices(path, content[_HEADER_BYTES:], order)
+        for matrix in islice(matrices, _MOST_MATRICES):
+            vectors |= _vectors(path, matrix, order)
+    return vectors
 
 
 def _matrices(path: Path, content: bytes, order: str) -> Iterator[bytes]:

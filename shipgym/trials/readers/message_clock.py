@@ -54,8 +54,9 @@ def _agreed(stamps: Clock, own: Clock, values: list[Value], notes: list[str]) ->
         return stamps
     if is_dated(stamps.t[0]):
         size = f"{middle:.6g} s"
-        if abs(middle) > DAY:
-            size = f"{middle / DAY:.3g} days"
+        days = middle / DAY
+        if abs(days) > 1.0:
+            size = f"{days:.3g} days"
         notes.append(
             f"the times before the lines are {size} ahead of those of {own.source},"
             " which are taken"

@@ -200,7 +200,8 @@ def _number(text: str, place: _Number, fields: Sequence[str]) -> float:
         value *= _FACTORS[unit]
     if place.side is None:
         return value
-    return copysign(value, _SIGNS[fields[place.side]])
+    side = fields[place.side]
+    return copysign(value, _SIGNS[side])
 
 
 def _transducer_values(fields: Sequence[str]) -> dict[str, float]:

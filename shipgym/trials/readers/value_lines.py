@@ -26,7 +26,8 @@ def read_moos(path: Path, content: bytes) -> LogTable:
     """
     values: list[_Value] = []
     rows = []
-    for line, text in enumerate(text_lines(path, content)[0], start=1):
+    lines, _ = text_lines(path, content)
+    for line, text in enumerate(lines, start=1):
         words = text.split()
         if len(words) != 4 or text.startswith("%"):
             continue
@@ -46,17 +47,19 @@ def read_dataflash(path: Path, content: bytes) -> LogTable:
     names: dict[str, list[str]] = {}
     values: list[_Value] = []
     rows = []
-    for line, text in enumerate(text_lines(path, content)[0], start=1):
-        kind, *words = [word.strip() for word in text.split(",")]
+    lines, _ = text_lines(path, content)
+    for line, one in enumerate(lines, start=1):
+        kind, *words = [word.strip() for word in one.split(",")]
         if kind == "FMT" and len(words) > 4:
             names[words[2]] = words[4:]
         columns = names.get(kind, [])
         if kind not in _MESSAGES or len(words) != len(columns):
             continue
-        numbers = dict(zip(columns, map(_number, words), strict=True))
-        time = numbers.pop("TimeUS", np.nan)
-        for column, number in numbers.items():
-            if np.isfinite(time) and np.isfinite(number):
+        texts = dict(zip(columns, words, strict=True))
+        time = _number(texts.pop("TimeUS", ""))
+        for column, text in texts.items():
+            number = _number(text)
+            if np.isfinite([time, number]).all():
                 values.append((time, f"{kind}.{column}", number))
                 rows.append(line)
     return _table(path, values, rows, unit="us")
