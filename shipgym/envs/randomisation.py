@@ -27,7 +27,7 @@ class Randomisation:
     """Variation from episode to episode, in addition to task and sea."""
 
     # {None, "covariance"}; whether each episode's ship is drawn from the identified
-    # covariance ("posterior" is taken too)
+    # covariance
     model_uncertainty: str | None = None
     # least and largest rate of the steering gear, deg/s
     rudder_rate_range: Range | None = None
@@ -45,17 +45,14 @@ class Randomisation:
     family_seed: int = 0
 
     def __post_init__(self) -> None:
-        kinds = ("covariance", "posterior")
         if self.model_uncertainty is not None:
-            check_choice(self.model_uncertainty, kinds, "model_uncertainty")
+            check_choice(self.model_uncertainty, ["covariance"], "model_uncertainty")
         if isinstance(self.ensemble, str | Path | ShipModel):
             raise unexpected("ensemble", "a list of models", self.ensemble)
-        if self.speed_range is not None:
-            _check_range(self.speed_range, "speed_range")
-        if self.loading_range is not None:
-            _check_range(self.loading_range, "loading_range")
-        if self.rudder_rate_range is not None:
-            _check_range(self.rudder_rate_range, "rudder_rate_range")
+        for name in ("speed_range", "loading_range", "rudder_rate_range"):
+            given = getattr(self, name)
+            if given is not None:
+                _check_range(given, name)
         check_whole(self.family, "family", at_least=0)
         check_whole(self.family_seed, "family_seed", at_least=0)
 

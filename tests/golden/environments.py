@@ -135,7 +135,7 @@ def cases() -> dict[str, Case]:
             "long dt": {"dt": 3.0},
             "changing sea": {"sea": CHANGING_SEA},
             "seas": {"sea": ["calm", "slight", GUSTS]},
-            "posterior": {"model_uncertainty": "posterior"},
+            "posterior": {"model_uncertainty": "covariance"},
             "ensemble": {"ensemble": ["mariner"], "speed_range": (0.7, 1.0)},
             "loading rough": {"loading_range": (0.9, 1.2), "sea": "rough"},
             "next step": {"autoreset_mode": "NextStep", "episode_steps": 450},
@@ -155,7 +155,7 @@ def cases() -> dict[str, Case]:
     )
     found[f"{COURSE} posterior grey box"] = Case(
         COURSE,
-        {"model": "kvlcc2-rm-svm", "model_uncertainty": "posterior", "sea": "rough"},
+        {"model": "kvlcc2-rm-svm", "model_uncertainty": "covariance", "sea": "rough"},
     )
     found["RudderRoll astern"] = Case(
         "RudderRoll",

@@ -72,7 +72,7 @@ def cases() -> dict[str, Case]:
             {
                 "course_change_deg": 50.0,
                 "change_interval_steps": 20,
-                "model_uncertainty": "posterior",
+                "model_uncertainty": "covariance",
             },
         ),
         "course single": Case(course, {**COSTS, **COURSES, "dt": 5.5}, single=True),

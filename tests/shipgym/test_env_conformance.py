@@ -206,7 +206,7 @@ def test_a_step_before_the_reset_or_after_the_end_is_refused(name):
         ({"model": None}, "model: expected a name, .* got None"),
         ({"model": "marinr"}, "Did you mean 'mariner'"),
         ({"model_uncertainty": "prior"}, "model_uncertainty: expected"),
-        ({"model_uncertainty": "posterior"}, "model 'mariner': expected a covariance"),
+        ({"model_uncertainty": "covariance"}, "model 'mariner': expected a covariance"),
         ({"ensemble": "tanker"}, "ensemble: expected a list of models, got 'tanker'"),
         (
             {"ensemble": ["tanker"]},

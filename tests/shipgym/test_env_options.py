@@ -282,8 +282,8 @@ def test_an_ensemble_gives_each_episode_one_of_its_ships():
 
 
 @pytest.mark.compiled
-def test_a_posterior_gives_each_episode_a_draw():
-    rates = turned(model="mariner-tls-svm", model_uncertainty="posterior")
+def test_a_covariance_gives_each_episode_a_draw():
+    rates = turned(model="mariner-tls-svm", model_uncertainty="covariance")
     nominal = turned(1, model="mariner-tls-svm")[0]
     assert 200 < len(np.unique(rates)) <= POOL_SIZE
     assert rates.mean() == pytest.approx(nominal, abs=0.5 * rates.std() + 1e-6)

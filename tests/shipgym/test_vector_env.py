@@ -46,7 +46,7 @@ def test_conformance_and_rows_that_are_single_environments(name, mode):
             PATH,
             {
                 "model": "mariner-tls-svm",
-                "model_uncertainty": "posterior",
+                "model_uncertainty": "covariance",
                 "speed_range": (0.7, 1.0),
             },
         ),
@@ -140,7 +140,7 @@ def test_a_vector_environment_says_what_is_wrong(mariner):
             {"ensemble": ["container"]},
             "ensemble: expected models of one structure, got 'container'",
         ),
-        ({"model_uncertainty": "posterior"}, "model 'mariner': expected a covariance"),
+        ({"model_uncertainty": "covariance"}, "model 'mariner': expected a covariance"),
         ({"speed_range": 0.5}, "speed_range: expected .* got 0.5"),
         ({"speed_range": (0.9, 0.5)}, "speed_range: the largest: expected"),
     ):
