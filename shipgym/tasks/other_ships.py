@@ -26,32 +26,31 @@ from shipgym.tasks.traffic import (
 #: Sawada, Sato & Majima 2021 (J. Mar. Sci. Technol. 26) have them. Own ship sails
 #: north; the others meet her at one place and time, on her own course at 0.7 of her
 #: speed. NaN: no ship.
-IMAZU = np.array(
-    [
-        [180.0, np.nan, np.nan],
-        [-90.0, np.nan, np.nan],
-        [0.0, np.nan, np.nan],
-        [45.0, np.nan, np.nan],
-        [180.0, -90.0, np.nan],
-        [-10.0, -45.0, np.nan],
-        [0.0, -45.0, np.nan],
-        [180.0, -90.0, np.nan],
-        [-30.0, -90.0, np.nan],
-        [-90.0, 15.0, np.nan],
-        [90.0, -30.0, np.nan],
-        [180.0, -45.0, -10.0],
-        [180.0, 10.0, 45.0],
-        [-10.0, -45.0, -90.0],
-        [0.0, -45.0, -90.0],
-        [45.0, 90.0, -90.0],
-        [0.0, 10.0, -45.0],
-        [-135.0, -15.0, -30.0],
-        [15.0, -15.0, -135.0],
-        [0.0, -15.0, -90.0],
-        [-15.0, 15.0, -90.0],
-        [0.0, -45.0, -90.0],
-    ]
-)
+IMAZU_COURSES = """
+     180  nan  nan
+     -90  nan  nan
+       0  nan  nan
+      45  nan  nan
+     180  -90  nan
+     -10  -45  nan
+       0  -45  nan
+     180  -90  nan
+     -30  -90  nan
+     -90   15  nan
+      90  -30  nan
+     180  -45  -10
+     180   10   45
+     -10  -45  -90
+       0  -45  -90
+      45   90  -90
+       0   10  -45
+    -135  -15  -30
+      15  -15 -135
+       0  -15  -90
+     -15   15  -90
+       0  -45  -90
+"""
+IMAZU = np.array(IMAZU_COURSES.split(), dtype=float).reshape(22, 3)
 
 SAFE = 3.0  # lengths of own ship, within which others count as close
 LEAST_START = 5.0  # lengths of own ship, between the two at the start

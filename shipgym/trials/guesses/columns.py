@@ -365,7 +365,7 @@ def _with_date(
         unit = "gps tow ms" if time.unit == "ms" else "gps tow"
         reason = "seconds of the GPS week, by its name"
         time = time._replace(unit=unit, reason=reason)
-    part = _second_of(table, time.column, free)
+    part = _second_of(time.column, free)
     if part is not None:
         free.remove(part)
         return time._replace(extra=(("nanoseconds", part),))
@@ -386,7 +386,7 @@ def _with_date(
     return time
 
 
-def _second_of(table: LogTable, column: str, free: list[str]) -> str | None:
+def _second_of(column: str, free: list[str]) -> str | None:
     """Column of the nanoseconds beside the seconds of a stamp of ROS; None without."""
     stem = re.sub(r"secs?$", "", column, flags=re.IGNORECASE)
     if stem == column:
