@@ -152,10 +152,7 @@ def begin_at(
     """Store a motion with what task and memory make of it; whether it is a start."""
     ship = load_ship(tile.ships, lane)
     settings = settings_of(tile)
-    order = motion.delta / ship.rudder_limit
-    commands = load_commands(tile.state, lane)
-    commands = commands._replace(rudder_command=order)
-    store_commands(tile.state, lane, commands)
+    hold_rudder(tile, lane, motion.delta / ship.rudder_limit)
     interval = last_interval(tile, lane)
     interval = interval._replace(dt=NO_TIME, rudder_before=motion.delta)
     given = (interval, ship, settings.task, tile, lane)
@@ -170,3 +167,10 @@ def begin_at(
     seen = sample(tile, lane, motion, interval, settings)
     store_memory(tile.state, lane, seen)
     return not (failed or arrived or lost(motion, ship))
+
+
+def hold_rudder(tile: Any, lane: int, order: float) -> None:
+    """Order the rudder where it stands, by its limit."""
+    commands = load_commands(tile.state, lane)
+    commands = commands._replace(rudder_command=order)
+    store_commands(tile.state, lane, commands)

@@ -147,8 +147,6 @@ def _columns(rows: list[str], delimiter: str, header: Sequence[str]) -> list[Any
 
     Stamps with a point stay texts: the digits behind it may be a count.
     """
-    import pandas as pd
-
     n_cells = len(header)
     if not rows:
         return [()] * n_cells
@@ -160,10 +158,19 @@ def _columns(rows: list[str], delimiter: str, header: Sequence[str]) -> list[Any
         cells = [split(row, delimiter)[:n_cells] for row in rows]
         return list(zip(*cells, strict=True))
     first = split(rows[0], delimiter)
-    as_texts = {}
+    as_texts = []
     for k, name in enumerate(header):
         if "stamp" in name.lower() and "." in first[k]:
-            as_texts[k] = str
+            as_texts.append(k)
+    return _plain_columns(text, delimiter, n_cells, as_texts)
+
+
+def _plain_columns(
+    text: str, delimiter: str, n_cells: int, as_texts: Sequence[int]
+) -> list[Any]:
+    """Columns of rows without quotes."""
+    import pandas as pd
+
     frame = pd.read_csv(
         io.StringIO(text),
         sep=r"\s+" if delimiter == BLANKS else delimiter,
@@ -172,7 +179,7 @@ def _columns(rows: list[str], delimiter: str, header: Sequence[str]) -> list[Any
         keep_default_na=False,
         na_values=[""],
         low_memory=False,
-        dtype=as_texts,
+        dtype=dict.fromkeys(as_texts, str),
     )
     columns: list[Any] = []
     for _, column in frame.items():

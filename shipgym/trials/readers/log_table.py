@@ -170,15 +170,19 @@ class LogTable:
         odd = self._odd_times(name, texts)
         if not 0 < len(odd) <= max(1.0, ODD_SHARE * len(texts)):
             return self
-        kept = np.delete(np.arange(len(texts)), odd).tolist()
-        cells = {}
-        for other, column in self.cells.items():
-            is_array = isinstance(column, np.ndarray)
-            cells[other] = column[kept] if is_array else [column[k] for k in kept]
         first = min(odd)
         place = self.cell(first, name)
         found = texts[first] or "nothing"
         note = f"{place}: {found!r} is no time, the row is left out{_and_more(odd)}"
+        kept = np.delete(np.arange(len(texts)), odd).tolist()
+        return self._of_rows(kept, note)
+
+    def _of_rows(self, kept: Sequence[int], note: str) -> "LogTable":
+        """The table of some of the rows, and a further note."""
+        cells = {}
+        for name, column in self.cells.items():
+            is_array = isinstance(column, np.ndarray)
+            cells[name] = column[kept] if is_array else [column[k] for k in kept]
         rows = [self.rows[k] for k in kept]
         return replace(self, cells=cells, rows=rows, notes=(*self.notes, note))
 
