@@ -98,6 +98,13 @@ def target_of(motion: Motion) -> Target:
     )
 
 
+def distance_to(motion: Motion, target: Target) -> float:
+    """Distance of another ship, m."""
+    away_x = target.x - motion.x
+    away_y = target.y - motion.y
+    return sqrt(away_x * away_x + away_y * away_y)
+
+
 def approach(motion: Motion, target: Target) -> Approach:
     """How a ship in still water, and another, approach each other."""
     away_x = target.x - motion.x
@@ -117,7 +124,7 @@ def approach(motion: Motion, target: Target) -> Approach:
     to_other = arctan2(away_y, away_x)
     to_own = arctan2(-away_y, -away_x)
     return Approach(
-        distance=sqrt(away_x * away_x + away_y * away_y),
+        distance=distance_to(motion, target),
         bearing=wrap(to_other - motion.psi),
         aspect=wrap(to_own - target.course),
         dcpa=sqrt(squared_dcpa),
