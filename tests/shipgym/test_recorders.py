@@ -111,6 +111,13 @@ def test_what_is_odd_is_counted_and_left_out(tmp_path, kind):
     assert note in " ".join(guess.trial.notes)
 
 
+def test_many_rows_without_a_time_are_refused_with_the_first_of_them(tmp_path):
+    columns = plain(Time=[one.t if one.t % 5 else "" for one in SHIP])
+    columns["Time [s]"] = columns.pop("Time")
+    with pytest.raises(InputError, match=r"line 2 .* time cannot be interpolated"):
+        guessed(tmp_path, table(columns, *columns.values()))
+
+
 def test_rows_without_their_last_cells_are_completed(tmp_path):
     text = "Time,Heading,Rudder,Depth,Note\n"
     for one in SHIP:
