@@ -232,7 +232,7 @@ def search(
         "seed": 1 + seed,
         "verbose": -9,
         "popsize": _generation(space),
-        "signals_filename": None,  # no settings from files in the working folder
+        "signals_filename": "",  # no settings from files in the working folder
     }
     strategy = cma.CMAEvolutionStrategy(np.zeros(len(space)), first_step, options)
     best = {setting.name: setting.start for setting in space}
