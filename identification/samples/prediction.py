@@ -3,12 +3,14 @@
 And the state from which they start where its first sample is not exact.
 """
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from identification.samples.preprocess import is_noisy, outliers
+from identification.samples.preprocess.noise import noise_level
 from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.models.simulate import first_state, open_loop, open_loop_states
@@ -64,7 +66,7 @@ def with_start(model: ShipModel, trial: Trial) -> Trial:
     opening = _opening_of(trial, model.travel_time)
     states = ("psi", "r") if is_yaw_alone(model) else ("psi", *"uvr", *"xy")
     names = [name for name in opening.inexact if name in states]
-    if not names or "psi" not in trial or len(opening.trial) < 3:
+    if not names or "psi" not in trial:
         return trial
     try:
         state = _Start(model, opening, names).estimated()
@@ -82,7 +84,7 @@ class _Opening(NamedTuple):
     """The first part of a trial, by which its start is estimated."""
 
     trial: Trial  # without outliers
-    inexact: list[str]  # channels whose first sample has noise, or was derived
+    inexact: dict[str, float]  # errors of first samples with noise, or derived
     measured: set[str]  # channels that were not derived
 
 
@@ -91,18 +93,40 @@ def _opening_of(trial: Trial, travel_time: float) -> _Opening:
     """The first part of a trial; `travel_time` to sail one ship length, s."""
     lengths = 1.5  # sailed while the start is estimated
     sound = trial.t <= trial.t[0] + lengths * travel_time
-    inexact = []
+    inexact = {}
     for name in ("psi", *"uvr", *"xy"):
         if name not in trial:
             continue
         wrong = outliers(trial.t, trial[name], may_step=False)
         if name in trial.derived or wrong[0] or is_noisy(trial.t, [trial[name]]):
-            inexact.append(name)
+            inexact[name] = math.inf if wrong[0] else _first_error(trial, name)
         if name not in trial.derived:
             sound[1:] &= ~wrong[1:]
+    if np.count_nonzero(sound) < 3:  # of a boat that is logged slowly
+        return _Opening(trial, {}, set())
     channels = {name: values[sound] for name, values in trial.channels.items()}
     measured = set(trial.channels) - trial.derived
     return _Opening(Trial(trial.t[sound], channels), inexact, measured)
+
+
+def _first_error(trial: Trial, name: str) -> float:
+    """Standard error of the first sample of a channel, SI units.
+
+    That of a derivative is large at the end of a record. A sample far from the parabola
+    through those that follow is wrong: it says nothing.
+    """
+    values = trial[name]
+    if name in trial.derived:
+        return 0.1 * float(np.ptp(values))
+    noise = noise_level(trial.t, values)
+    n_next = 8
+    t = trial.t[: n_next + 1] - trial.t[0]
+    if len(t) <= n_next:
+        return noise
+    parabola = np.polyfit(t[1:], values[1 : n_next + 1], deg=2)
+    apart = abs(float(values[0] - parabola[-1]))
+    largest = 10.0 * noise  # five errors of the sample and of the parabola there
+    return noise if apart < largest else math.inf
 
 
 class _Start:
@@ -111,6 +135,7 @@ class _Start:
     def __init__(self, model: ShipModel, opening: _Opening, names: list[str]) -> None:
         self.model = model
         self.trial = opening.trial
+        self.spreads = np.array([max(opening.inexact[name], 1e-9) for name in names])
         least = _least_errors(model, opening.measured)
         self.floors = np.array(
             list(least.values())
@@ -120,6 +145,7 @@ class _Start:
         self.compared = [state_names.index(name) for name in least]
         length, speed = model.particulars["length"], model.particulars["speed"]
         scale_of = {"psi": 1.0, "r": speed / length, "x": length, "y": length}
+        self.places = [state_names.index(name) for name in names]
         #: a small change of each state that is estimated, shape (n_names, n_state)
         self.moves = np.zeros((len(names), len(state_names)))
         for row, name in enumerate(names):
@@ -129,19 +155,28 @@ class _Start:
         """State from which the model comes nearest, shape (n_state,).
 
         Three rounds of Gauss-Newton: what is simulated is nearly linear in its start.
-        The scales are renewed between them, which `scipy.optimize.least_squares` would
-        take for fits of their own, of more simulations each and other last digits.
+        The first samples count by their errors, what follows by the errors that are
+        left, of which neighbours say the same (`_independent`). These scales are
+        renewed between the rounds, which `scipy.optimize.least_squares` would take for
+        fits of their own, of more simulations each and other last digits.
         """
-        start = first_state(self.model, self.trial)
+        logged = first_state(self.model, self.trial)
+        start = logged
         scales = self.floors
+        rows = np.arange(len(self.places))
+        prior = np.diag(self.moves[rows, self.places] / self.spreads)
         for _ in range(3):
             errors, *moved = self._errors(np.vstack([start, start + self.moves]))
             changes = [((other - errors) / scales).ravel() for other in moved]
             residuals = (errors / scales).ravel()
-            excess, *_ = np.linalg.lstsq(np.array(changes).T, residuals, rcond=1e-6)
+            by_start = np.vstack([np.array(changes).T, prior])
+            beyond = (start - logged)[self.places] / self.spreads
+            targets = np.concatenate([residuals, beyond])
+            excess, *_ = np.linalg.lstsq(by_start, targets, rcond=1e-6)
             start = start - excess @ self.moves
             left = errors - np.tensordot(excess, np.array(moved) - errors, axes=1)
-            scales = np.maximum(np.sqrt(np.mean(left**2, axis=0)), self.floors)
+            sizes = np.maximum(np.sqrt(np.mean(left**2, axis=0)), self.floors)
+            scales = sizes * np.sqrt(len(left) / _independent(left))
         return start
 
     def _errors(self, starts: Floats) -> Floats:
@@ -152,6 +187,18 @@ class _Start:
         states = open_loop_states(self.model, self.trial, starts)
         errors = states[:, :, self.compared] - self.measured
         return np.asarray(errors[:, 1:])
+
+
+def _independent(errors: Floats) -> Floats:
+    """Number of independent errors of each channel, by those of neighbours.
+
+    `errors`: shape (n_samples, n_channels).
+    """
+    squares = np.sum(errors**2, axis=0) + 1e-30
+    together = np.sum(errors[1:] * errors[:-1], axis=0) / squares
+    correlation = np.clip(together, 0.0, 0.999)
+    share = (1.0 - correlation) / (1.0 + correlation)
+    return np.asarray(np.maximum(len(errors) * share, 1.0))
 
 
 def _least_errors(model: ShipModel, measured: set[str]) -> dict[str, float]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
@@ -433,24 +432,12 @@ def _frozen_channels(
         check_channel(channel, where, time=False)
         array = _frozen_array(values, f"{where}: {channel}")
         arrays[channel] = array
-        if channel in ("delta", "delta_command"):
-            _check_rudder(array, f"{where}: {channel}")
         if array.shape != shape:
             raise InputError(
                 f"{where}: {channel}: expected {shape[0]} samples as in t, got"
                 f" {array.size}"
             )
     return arrays
-
-
-def _check_rudder(values: Floats, where: str) -> None:
-    """Refuse a rudder beyond 90 deg, as of degrees given for radians."""
-    largest = float(np.abs(values).max(initial=0.0))
-    if largest > 0.5 * math.pi + 1e-9:
-        raise InputError(
-            f"{where}: expected radians of at most 1.571 (90 deg), got {largest:.4g};"
-            " likely degrees: give numpy.radians(...)"
-        )
 
 
 def _frozen_array(values: npt.ArrayLike, where: str) -> Floats:

@@ -42,6 +42,8 @@ def test_a_rudder_that_never_moves_excites_nothing(
         in told
     )
     assert "such as a zigzag" in told
+    told = refusal(changed(cao_zigzag, "degrees", delta=57.3 * cao_zigzag["delta"]))
+    assert "trial 'degrees': delta: expected radians of at most 1.571" in told
 
 
 @pytest.mark.parametrize(

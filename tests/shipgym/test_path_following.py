@@ -97,8 +97,7 @@ def on_path(radius, plan):
         leg_from(0, 0.0, radius, plan),
         *[0.0] * 8,
         RudderActivity(0.0, 0.0, 0.0),
-        0.0,
-        0.0,
+        *[0.0] * 4,
     )
 
 
