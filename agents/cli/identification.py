@@ -36,7 +36,7 @@ def identify_command(
     names a structure, the structure and method that best predict held-out trials are
     chosen.
 
-    Exits with 1 if the identified model is unstable.
+    Exits with 1 if the identified model is unstable, or predicts nothing.
     """
     from agents.cli.tables import prediction_table, selection_table
     from agents.cli.terminal import answer, console, identifying, say
@@ -91,13 +91,19 @@ def _chosen(
 def _check_stable(result: IdentificationResult) -> None:
     """Fail for an unstable model, else warn of what has to be known."""
     from agents.cli.terminal import warn
-    from identification.judging.warnings import model_warnings, why_unstable
+    from identification.judging.warnings import (
+        model_warnings,
+        why_unstable,
+        why_useless,
+    )
 
     if (instability := why_unstable(result)) is not None:
         fail(
             f"the identified model is unstable: {instability}; it must not be used",
             FAILED,
         )
+    if (fault := why_useless(result)) is not None:
+        fail(f"no structure predicts this ship: {fault}", FAILED)
     notes = [f"{trial.name}: {note}" for trial in result.trials for note in trial.notes]
     for warning in [*notes, *model_warnings(result)]:
         warn(warning)

@@ -38,6 +38,35 @@ def why_unstable(fit: Fit) -> str | None:
     return f"its simulation runs away ({reasons[0]})"
 
 
+def why_useless(fit: Fit) -> str | None:
+    """Why a model predicts no better than none; None where it does.
+
+    The heading that it predicts of trials that it has not seen, held out or left out in
+    turn by the choice of the structure, is further off than 1.5 of its own standard
+    deviations there.
+    """
+    spreads = {}
+    for trial in fit.trials:
+        if "psi" in trial:
+            spreads[trial.name] = float(np.degrees(np.std(trial["psi"])))
+    errors = heading_errors_deg(fit, "validate")
+    ranking = fit.metrics.get("selection", {}).get("ranking", [])
+    if not errors and ranking and ranking[0]["heading_deg"] is not None:
+        mean = float(np.mean([*spreads.values()]))
+        errors = {"trials left out": ranking[0]["heading_deg"]}
+        spreads = {"trials left out": mean}
+    least_turning = 5.0  # deg, of a trial that shows whether a ship turns
+    judged = [name for name in errors if spreads.get(name, 0.0) > least_turning]
+    if not judged or any(errors[name] < 1.5 * spreads[name] for name in judged):
+        return None
+    worst = max(judged, key=lambda name: errors[name] / spreads[name])
+    return (
+        f"it predicts the heading of {PurePath(worst).name} to {errors[worst]:.3g} deg,"
+        f" where the heading itself varies by {spreads[worst]:.3g} deg: check rudder,"
+        " clock and units of the logs (shipgym look), or record zigzags"
+    )
+
+
 def model_warnings(fit: Fit) -> list[str]:
     """Warnings before a stable model is used, sentences without capital and stop."""
     provenance = _provenance(fit)
