@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from identification import LSSVM, IdentificationResult, identify
+from identification.judging.warnings import why_useless
 from identification.models.guard import (
     reasons_unstable,
 )
@@ -118,3 +119,24 @@ def test_a_stable_fit_is_left_alone(cao_fit: IdentificationResult) -> None:
     assert cao_fit.stable
     assert cao_fit.model.provenance is not None
     assert cao_fit.model.provenance["guard"] == {"decision": "stable as fitted"}
+
+
+def test_a_model_that_predicts_nothing_is_said_to_be_useless(
+    cao_zigzag: Trial, mariner: ShipModel, cao_fit: IdentificationResult
+) -> None:
+    """A rudder that has nothing to do with the heading, as of another ship's log."""
+    t = cao_zigzag.t
+    strange = Trial(
+        t,
+        {
+            **cao_zigzag.channels,
+            "psi": 0.4 * np.sin(t / 23.0),
+            "r": 0.4 / 23.0 * np.cos(t / 23.0),
+            "delta": 0.2 * np.sign(np.sin(t / 61.0)),
+        },
+        name="strange",
+        use="validate",
+    )
+    fit = identify([cao_zigzag, strange], particulars=mariner.particulars)
+    assert "predicts the heading of strange to" in str(why_useless(fit))
+    assert why_useless(cao_fit) is None

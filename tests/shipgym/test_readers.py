@@ -141,6 +141,8 @@ def test_a_sheet_begins_with_names_where_it_is_not_empty(tmp_path):
         assert "log.xlsx: row 2: expected names of columns, each once" in refusal(path)
     workbook(path, ["t", "u"], [0, 1], [1, 1], [2, 1], merged="A3:A4")
     assert "expected a cell for each value, got merged cells A3:A4" in refusal(path)
+    rows = ["Zigzag trial", None], ["t", "psi"], [0, 1], [1, 1], [2, 1]
+    assert len(Trial.from_csv(workbook(path, *rows, merged="A1:B1"))) == 3
 
 
 @pytest.mark.parametrize("compressed", [False, True])

@@ -1,6 +1,7 @@
 """Tables in frames of pandas, and in files that libraries read: Excel and Parquet."""
 
 import io
+import re
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -126,13 +127,14 @@ def read_excel(path: Path, content: bytes) -> LogTable:
     with damage_reported(path, "Excel (.xlsx)", remedy):
         parts = zipfile.ZipFile(io.BytesIO(content))
         check_unpacked(path, sum(part.file_size for part in parts.infolist()))
-        frame = _sheet(path, content, parts)
+        frame, merged = _sheet(path, content, parts)
         frame = frame.dropna(how="all")
         frame = frame.dropna(axis=1, how="all")
         texts = frame.iloc[:100].map(str).where(frame.iloc[:100].notna(), "")
         first_rows = dict(enumerate(texts.to_numpy().tolist()))
         layout = layout_of_rows(first_rows) or Layout("", header=0)
         header = frame.iloc[layout.header]
+        _refuse_merged(path, merged, names_at=int(header.name) + 1)
         names = _column_names(path, header)
         below = max(layout.header, *layout.units, 0) + 1
         values = frame.iloc[below:]
@@ -148,10 +150,10 @@ def read_excel(path: Path, content: bytes) -> LogTable:
         )
 
 
-def _sheet(path: Path, content: bytes, parts: zipfile.ZipFile) -> Any:
-    """Cells of the first sheet as a pandas frame.
+def _sheet(path: Path, content: bytes, parts: zipfile.ZipFile) -> tuple[Any, list[str]]:
+    """Cells of the first sheet as a pandas frame, and which are merged.
 
-    Raises InputError for too many or merged ones.
+    Raises InputError for too many.
     """
     openpyxl = import_module("openpyxl")
     pandas = import_module("pandas")
@@ -165,21 +167,22 @@ def _sheet(path: Path, content: bytes, parts: zipfile.ZipFile) -> Any:
         raise InputError(
             f"{path}: expected at most {_MOST_CELLS} cells, got more; save it as CSV"
         )
-    _refuse_merged(path, sheet, parts)
-    return pandas.DataFrame(sheet.iter_rows(values_only=True), dtype=object)
-
-
-def _refuse_merged(path: Path, sheet: Any, parts: zipfile.ZipFile) -> None:
     source = parts.read(sheet._worksheet_path)
-    _, merged, after = source.partition(b'<mergeCell ref="')
-    if merged:
-        place, *_ = after.partition(b'"')
-        cells = place.decode("ascii", "replace")
-        raise InputError(
-            f"{path}: sheet {sheet.title!r}: expected a cell for each value, got merged"
-            f" cells {cells}; unmerge them (Home, Merge & Center, Unmerge Cells), or"
-            " save the table as CSV"
-        )
+    merged = re.findall(r'<mergeCell ref="([^"]+)"', source.decode("ascii", "replace"))
+    frame = pandas.DataFrame(sheet.iter_rows(values_only=True), dtype=object)
+    return frame, merged
+
+
+def _refuse_merged(path: Path, merged: list[str], names_at: int) -> None:
+    """Refuse merged cells from the row of the names on; titles may be merged."""
+    for cells in merged:
+        last_row = int(re.sub(r"\D", "", cells.partition(":")[2]) or 0)
+        if last_row >= names_at:
+            raise InputError(
+                f"{path}: expected a cell for each value, got merged cells {cells};"
+                " unmerge them (Home, Merge & Center, Unmerge Cells), or save the table"
+                " as CSV"
+            )
 
 
 def _column_names(path: Path, cells: Any) -> list[str]:
