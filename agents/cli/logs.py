@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 _STEERING = frozenset({"delta", "delta_command"})
 _TURNING = frozenset({"psi", "r"})
-_HEADING = frozenset({"psi"})
 
 
 def new_ship_command(
@@ -88,7 +87,8 @@ def _facts(guessed: list[TrialGuess], out: Path) -> dict[str, Any]:
     first, *_ = guessed
     side = _rudder_side(guessed)
     speed = _service_speed(guessed)
-    has_rate_alone = not any(_has(one, _HEADING) for one in guessed)
+    named = {column.channel for one in guessed for column in one.columns}
+    has_rate_alone = "r" in named and "psi" not in named
     are_read = any(one.trial is not None for one in guessed)
     needs_speed = are_read and has_rate_alone and speed is None
     shared = _shared_columns(guessed)

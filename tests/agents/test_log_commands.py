@@ -194,3 +194,14 @@ def test_cuts_are_proposed_for_a_log_with_idle_parts(log, monkeypatch, capsys, i
     if idle:
         (trial,) = ShipFile.load(log / "ship.toml").trials()
         assert 300.0 <= trial.duration <= 400.0
+
+
+def test_a_yaw_rate_alone_needs_the_service_speed(log, monkeypatch, capsys):
+    rates = [
+        f"{k};{2.0 * np.sin(0.05 * k):.3f};{9.0 * np.sin(0.05 * k + 1.0):.2f}"
+        for k in range(200)
+    ]
+    (log / "rate.csv").write_text("\n".join(["t;ROT [deg/s];Rudder [deg]", *rates]))
+    _, said = command(monkeypatch, capsys, "new-ship", "rate.csv", "--length", "9")
+    assert "to decide: speed: the service speed" in said
+    assert 'speed = "decide"' in (log / "ship.toml").read_text()
