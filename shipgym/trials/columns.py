@@ -34,6 +34,7 @@ class Column:
     mean_with: str | None = None  # column of the other rudder
     full: float | None = None  # change of the command that counts as 35 deg of rudder
     quaternion: tuple[str, ...] | None = None  # columns of x, y and z, beside that of w
+    file: str | None = None  # of several that are one log, where more have the column
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,8 @@ def parse_columns(
 ) -> dict[str, Column]:
     """Check a table of columns by channel.
 
-    Each entry is the name of a column or ``{"column": name, "unit": unit}``. That of
+    Each entry is the name of a column or ``{"column": name, "unit": unit}``, with
+    ``"file"``, its name, where several files of one log have that column. That of
     the time may also have ``"date"``, the column of the date, ``"nanoseconds"`` and
     ``"zone"``, that of the heading ``"quaternion"``, the columns of x, y and z beside
     that of w, that of the rudder ``"full"``, ``"neutral"`` and ``"minus"``, which make
@@ -91,7 +93,7 @@ def parse_columns(
 
 def _parse_column(channel: str, entry: Any, where: str) -> Column:
     fields = dict(entry) if isinstance(entry, Mapping) else {"column": entry}
-    keys = ["column", "unit"]
+    keys = ["column", "unit", "file"]
     if channel == "t":
         keys += ["date", "zone", "nanoseconds"]
     if channel in ("delta", "delta_command"):
@@ -170,7 +172,7 @@ def choose_columns(
     named = {"t": Column("t"), **columns}
     chosen = {}
     for channel, column in named.items():
-        is_elsewhere = part and column.name not in table.cells
+        is_elsewhere = part and not _is_in(table, column)
         if is_elsewhere and channel != "t":
             continue
         known_unit = table.units.get(column.name, si_unit(channel))
@@ -181,6 +183,12 @@ def choose_columns(
             f"{table.path}: columns: expected some of {channels}, got time alone"
         )
     return chosen
+
+
+def _is_in(table: LogTable, column: Column) -> bool:
+    """Return whether a column is to be read from a part of a log."""
+    of_other_file = column.file is not None and column.file != table.path.name
+    return column.name in table.cells and not of_other_file
 
 
 def _named_like_channels(table: LogTable) -> dict[str, Column]:

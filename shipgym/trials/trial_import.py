@@ -116,7 +116,8 @@ def _on_first_clock(
         names = quoted(sorted(repeated))
         raise InputError(
             f"{path}: expected each channel in one file of this log, got"
-            f" {names} again; rename the column that is not to be read"
+            f" {names} again; name the file of the one to read: {{ column = ..., file ="
+            f' "{path.name}" }}'
         )
 
     first_start = first.start or 0.0

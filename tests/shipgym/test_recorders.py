@@ -8,6 +8,7 @@ import pytest
 
 from shipgym.errors import InputError
 from shipgym.trials.guesses import guess_trial
+from shipgym.trials.ship_file import ShipFile
 from tests.shipgym.one_zigzag import sailed
 
 SHIP = list(sailed(240))
@@ -268,3 +269,36 @@ def test_names_of_parts_are_known(tmp_path):
     text = table(names, T, columns["Heading"], columns["Rudder"], *positions)
     found = [one.channel for one in guessed(tmp_path, text).columns]
     assert sorted(found) == ["delta", "lat", "lon", "psi", "t"]
+
+
+def test_of_two_files_with_a_column_the_named_one_is_read(tmp_path):
+    columns = plain()
+    text = table(["t", "yaw", "Rudder"], T, columns["Heading"], columns["Rudder"])
+    (tmp_path / "att.csv").write_text(text)
+    (tmp_path / "nav.csv").write_text(
+        table(["t", "yaw", "u"], T, 0.0 * T, 7.0 + 0.0 * T)
+    )
+    ship_file = tmp_path / "ship.toml"
+    content = """
+[ship]
+length = 100.0
+[columns]
+psi = { column = "yaw", unit = "deg"FILE }
+delta = { column = "Rudder", unit = "deg" }
+u = "u"
+[[trials]]
+file = ["att.csv", "nav.csv"]
+"""
+    ship_file.write_text(content.replace("FILE", ', file = "att.csv"'))
+    (trial,) = ShipFile.load(ship_file).trials()
+    assert turned(trial) < 0.3
+    ship_file.write_text(content.replace("FILE", ""))
+    with pytest.raises(InputError, match="name the file of the one to read"):
+        ShipFile.load(ship_file).trials()
+
+
+def test_a_boat_that_gybes_is_read(tmp_path):
+    psi = 40.0 + 90.0 / (1.0 + np.exp(-(T - 120.0)))
+    columns = plain(Heading=[f"{one:.1f}" for one in psi])
+    guess = guessed(tmp_path, table(columns, *columns.values()))
+    assert np.degrees(np.ptp(guess.trial["psi"])) == pytest.approx(90.0, abs=1.0)
