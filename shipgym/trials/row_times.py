@@ -119,9 +119,11 @@ def _are_unpadded(cells: list[str]) -> bool:
     stamps = [cell for cell in cells if _STAMP.fullmatch(cell)]
     if len(stamps) < 3 or len(stamps) < len(cells):
         return False
-    as_written = np.diff([float(cell) for cell in stamps])
-    as_counts = np.diff([float(_padded(cell)) for cell in stamps])
-    return bool(np.any(as_written <= 0.0) and np.all(as_counts > 0.0))
+    as_written = [float(stamp) for stamp in stamps]
+    as_counts = [float(_padded(stamp)) for stamp in stamps]
+    goes_back = np.any(np.diff(as_written) <= 0.0)
+    increases = np.all(np.diff(as_counts) > 0.0)
+    return bool(goes_back and increases)
 
 
 def _padded(stamp: str) -> str:

@@ -69,11 +69,16 @@ def check_over_ground(
 
 def _counts_from_east(psi: Floats, course: Floats) -> bool:
     """Return whether a heading counts from east to port, by the course in rad."""
-    mirrored = np.exp(1j * (course + psi - 0.5 * math.pi)).mean()
-    agreement = abs(np.exp(1j * (course - psi)).mean())
     is_turning = np.ptp(psi) > 20.0 * DEGREE
-    is_mirrored = abs(mirrored) > max(0.95, agreement + 0.02)
-    return bool(is_turning and is_mirrored and abs(np.angle(mirrored)) < 0.4)
+    from_mirror = course + psi - 0.5 * math.pi
+    from_heading = course - psi
+    mirrored = np.exp(1j * from_mirror).mean()
+    agreement = abs(np.exp(1j * from_heading).mean())
+    fewest = max(0.95, agreement + 0.02)
+    is_mirrored = abs(mirrored) > fewest
+    offset = abs(np.angle(mirrored))
+    is_about_north_east = offset < 0.4  # rad, what a ship drifts
+    return bool(is_turning and is_mirrored and is_about_north_east)
 
 
 def _heading_fault(psi: Floats, course: Floats, *, offset_is_known: bool) -> str:
