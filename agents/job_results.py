@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -31,35 +31,24 @@ def job_to_json(job: Any, where: str) -> str:
 
 def result_to_json(result: Any) -> str:
     """A result as JSON text; TypeError if it is neither JSON nor an array of it."""
+    return json.dumps(result, default=_encoded)
 
-    def encode(item: Any) -> Any:
-        if isinstance(item, np.generic):
-            return item.item()
-        if isinstance(item, np.ndarray) and item.dtype.kind in "biufU":
-            is_text = item.dtype.kind == "U"
-            dtype = "str" if is_text else item.dtype.name
-            return {"__array__": item.tolist(), "dtype": dtype}
-        raise TypeError(
-            "result: expected numbers, strings, lists, dicts and arrays of numbers or"
-            f" strings, got {type(item).__name__}"
-        )
 
-    return json.dumps(result, default=encode)
+def _encoded(item: Any) -> Any:
+    if isinstance(item, np.generic):
+        return item.item()
+    if isinstance(item, np.ndarray) and item.dtype.kind in "biufU":
+        return {"__array__": item.tolist(), "dtype": item.dtype.str}
+    raise TypeError(f"result: expected what JSON holds, got {type(item).__name__}")
 
 
 def result_from_json(text: str) -> Any:
-    """The result that `result_to_json` was given, the same bit for bit.
-
-    Raises TypeError, ValueError, OverflowError or RecursionError for broken text.
-    """
+    """The result that `result_to_json` was given, the same bit for bit."""
 
     def decode(table: dict[str, Any]) -> Any:
         if table.keys() != {"__array__", "dtype"}:
             return table
-        dtype = table["dtype"]
-        if dtype != "str" and np.dtype(dtype).kind not in "biuf":
-            raise ValueError(f"array of {dtype}")
-        return np.array(table["__array__"], dtype)
+        return np.array(table["__array__"], table["dtype"])
 
     return json.loads(text, object_hook=decode)
 
@@ -68,52 +57,29 @@ class KeptResults:
     """Folder with a file for each finished job, named by a hash of the job.
 
     Results of another function or another version of shipgym are not taken. The folder
-    is made with the first result. Jobs and results are JSON text. Raises InputError if
-    `folder` is a file.
+    is made with the first result. Jobs and results are JSON text.
     """
 
     def __init__(self, folder: str | Path, function: JobFunction) -> None:
         self.folder = Path(folder)
         self.function = f"{function.__module__}.{function.__qualname__}"
-        if self.folder.exists() and not self.folder.is_dir():
-            raise InputError(
-                f"{folder}: expected a folder for results, got a file; choose another"
-            )
-
-    def load_all(self, jobs: Iterable[str]) -> dict[str, str]:
-        """Results by job, of those jobs that are finished."""
-        results = {}
-        for job in jobs:
-            result = self.load(job)
-            if result is not None:
-                results[job] = result
-        return results
 
     def load(self, job: str) -> str | None:
         """Result of a job, None if there is none or its file is broken."""
-        key, path = self._key(job)
         try:
-            content = read_json(path, "result", "it is computed again")
-            result = str(content["result"])
+            result: str = read_json(self.path(job), "result", "it is run again")[job]
             result_from_json(result)
         except Exception:  # there are many ways to be broken
             return None
-        return result if content.get("key") == key else None
+        return result
 
     def save(self, job: str, result: str) -> None:
         """Write the result of a job, whole or not at all."""
-        key, path = self._key(job)
         make_folder(self.folder)
-        write_json({"key": key, "result": result}, path)
+        write_json({job: result}, self.path(job))
 
-    def _key(self, job: str) -> tuple[dict[str, Any], Path]:
-        """Key of a result, and its file."""
-        key = {
-            "shipgym": shipgym.__version__,
-            "function": self.function,
-            "job": json.loads(job),
-        }
-        text = json.dumps(key, sort_keys=True)
-        digest = hashlib.sha256(text.encode())
-        name = digest.hexdigest()[:24]
-        return key, self.folder / f"{name}.json"
+    def path(self, job: str) -> Path:
+        """Return the file of a job."""
+        key = "\n".join([shipgym.__version__, self.function, job])
+        digest = hashlib.sha256(key.encode()).hexdigest()
+        return self.folder / f"{digest[:24]}.json"

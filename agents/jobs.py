@@ -5,21 +5,14 @@ has one thread, and jobs and results pass through JSON in every case.
 """
 
 import json
-import logging
 import os
-import signal
-import socket
 import sys
-import threading
-import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import chdir, closing, contextmanager
 from dataclasses import dataclass
-from functools import cache
 from importlib import import_module
-from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
@@ -131,7 +124,11 @@ def run_jobs(
         )
     texts = [job_to_json(job, f"jobs[{number}]") for number, job in enumerate(jobs)]
     kept = None if where.keep is None else KeptResults(where.keep, function)
-    results = {} if kept is None else kept.load_all(texts)
+    results = {}
+    for text in texts:
+        result = None if kept is None else kept.load(text)
+        if result is not None:
+            results[text] = result
     pending = [text for text in dict.fromkeys(texts) if text not in results]
 
     def report() -> None:
@@ -163,7 +160,7 @@ def _do_job(function: JobFunction, text: str) -> tuple[str, str]:
     """Do a job on one thread; errors become some that have the job in their message."""
     variables = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     one_thread = dict.fromkeys(variables, "1")  # for libraries loaded by the job
-    name = f"job {_shortened(text)}"
+    name = f"job {text[:200]}"
     try:
         with _environment(one_thread), threadpool_limits(1):
             result = function(json.loads(text))
@@ -174,38 +171,16 @@ def _do_job(function: JobFunction, text: str) -> tuple[str, str]:
         raise JobError(f"{name}: {type(error).__name__}: {error}") from error
 
 
-def _shortened(text: str) -> str:
-    """Beginning of a text, for a message."""
-    longest = 200  # characters
-    if len(text) <= longest:
-        return text
-    return f"{text[:longest]} ..."
-
-
 def _do_in_worker(
     function: JobFunction, modules: Sequence[str], folder: Path, text: str
 ) -> tuple[str, str]:
     """Do a job in another process, in a folder, after importing users' controllers."""
-    _end_with_parent()
     if folder.is_dir():  # another computer may lack it
         os.chdir(folder)
     with working_folder():
         for module in modules:
             import_module(module)
     return _do_job(function, text)
-
-
-@cache
-def _end_with_parent() -> None:
-    """Let this process end when its parent does, even if the parent is killed."""
-    parent = os.getppid()
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(0.5)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 def _calls(function: JobFunction, texts: Sequence[str]) -> Iterator[Any]:
@@ -231,7 +206,7 @@ def _in_processes(function: JobFunction, texts: list[str], workers: int) -> Fini
         pre_dispatch=workers,
     )
     try:
-        with _environment({"PYTHONSAFEPATH": "1"}), _interrupts_held():
+        with _environment({"PYTHONSAFEPATH": "1"}):
             results = run(_calls(function, texts))
         with warnings.catch_warnings(), closing(results) as finished:
             warnings.filterwarnings("ignore", ".*tasks which were still being")
@@ -240,23 +215,6 @@ def _in_processes(function: JobFunction, texts: list[str], workers: int) -> Fini
         raise _killed_worker() from None
     finally:
         get_reusable_executor().shutdown(wait=True, kill_workers=True)
-
-
-@contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Hold Ctrl-C back while processes start, so that it never reaches them.
-
-    They inherit this and would end with tracebacks, which this process ends itself.
-    """
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    resource_tracker.ensure_running()  # its start would let Ctrl-C through
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _on_ray(function: JobFunction, texts: list[str], where: JobEngine) -> Finished:
@@ -281,7 +239,6 @@ def _on_ray(function: JobFunction, texts: list[str], where: JobEngine) -> Finish
 @contextmanager
 def _connected_ray(where: JobEngine) -> Iterator[Any]:
     """Ray, connected, as a backend of joblib; what is started here ends here."""
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -289,19 +246,14 @@ def _connected_ray(where: JobEngine) -> Iterator[Any]:
         except InputError as error:
             raise EngineError(str(error)) from None
         import_module("ray.util.joblib").register_ray()
-        pool = logging.getLogger("ray.util.multiprocessing.pool")
-        pool.setLevel(logging.ERROR)  # it warns of an argument that joblib gives it
     if ray.is_initialized():
         yield ray
         return
 
     options: dict[str, Any] = {"log_to_driver": False, "configure_logging": False}
+    options["address"] = where.address or "local"
     if where.address is None:
-        options |= {"address": "local", "num_cpus": where.workers}
-        options["include_dashboard"] = False
-    else:
-        _check_address(where.address)
-        options["address"] = where.address
+        options |= {"num_cpus": where.workers, "include_dashboard": False}
     paths = os.pathsep.join(filter(None, sys.path))
     root = Path.cwd().anchor  # Ray lets its workers import from the working folder
     try:
@@ -313,21 +265,6 @@ def _connected_ray(where: JobEngine) -> Iterator[Any]:
         yield ray
     finally:
         ray.shutdown()
-
-
-def _check_address(address: str) -> None:
-    """Refuse an address at which nothing listens; Ray would wait for minutes."""
-    if address == "auto":
-        return
-    host, _, port = address.removeprefix("ray://").rpartition(":")
-    try:
-        socket.create_connection((host.strip("[]"), int(port)), timeout=10.0).close()
-    except (OSError, ValueError, OverflowError) as error:
-        raise EngineError(
-            "address: expected a Ray cluster at 'HOST:PORT', 'ray://HOST:PORT' or"
-            f" 'auto', got '{address}' ({error}); start one by `ray start --head`, or"
-            " leave the address out to run on this computer"
-        ) from None
 
 
 @contextmanager

@@ -32,7 +32,6 @@ METRICS = (
     Metric("speed_lost_percent", "speed lost, %"),
     Metric("outside_corridor", "share of time outside corridor"),
     Metric("success", "share of success"),
-    Metric("fuel", "fuel, straight run = 1"),
 )
 
 

@@ -4,9 +4,8 @@ Intervals in which an episode was over do not count. A figure that an episode do
 have (nothing sailed, no path) is NaN.
 
 Sources: Norrbin 1972, On the added resistance due to steering on a straight course
-(steering cost); van Amerongen 1982, Adaptive steering of ships (way lengthened and
-speed lost by steering); Carlton 2012, Marine Propellers and Propulsion, chapter 6
-(propeller law: power is proportional to the cube of the shaft speed).
+(steering cost); van Amerongen 1982, Adaptive steering of ships (speed lost by
+steering).
 """
 
 from typing import NamedTuple
@@ -18,6 +17,7 @@ from agents.controllers.interface import Policy
 from agents.rollouts.rollout import Rollout, rollout
 from agents.suites.suite import BenchmarkTask
 from shipgym.arrays import Flags, Floats
+from shipgym.engine.lane_records import CONSTRAINT
 from shipgym.python_files import asked
 from shipgym.tasks.task import Task
 
@@ -26,8 +26,7 @@ DEAD_BAND = np.radians(0.5)  # the rudder has turned round once it came back by 
 
 def recorded_for_metrics(task: Task) -> tuple[str, ...]:
     """Names of what a rollout has to record for `metrics`."""
-    # Physical states that `metrics` needs, beside all of `info`.
-    states = ("psi", "u", "v", "n", "delta", "phi", "set_point")
+    states = ("psi", "u", "delta", "phi", "set_point")
     return (*states, *task.info_names)
 
 
@@ -37,19 +36,8 @@ def worst_step_cost(task: Task) -> float:
 
 
 def _on_path(task: Task) -> bool:
-    # Entries of `info` from which the figures of paths are computed.
-    path_info = (
-        "cross_track",
-        "in_corridor",
-        "distance_made_good",
-        "grounded",
-        "success",
-    )
+    path_info = ("cross_track", "in_corridor", "success")
     return set(path_info) <= set(task.info_names)
-
-
-def _keeps_course(task: Task) -> bool:
-    return "heading_error" in task.info_names
 
 
 def metrics(run: Rollout) -> dict[str, Floats]:
@@ -68,41 +56,40 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         reached, else whether control was kept.
     """
     nowhere = np.full(len(run.seeds), np.nan)
-    of_paths = ("cross_track_rmse_m", "outside_corridor", "left_corridor", "grounded")
-    undefined = dict.fromkeys(of_paths, nowhere)
-    own = task_figures(run)
-    succeeded = own["success"] > 0.0
-    lost = run.terminated & ~succeeded
+    followed = dict.fromkeys(("cross_track_rmse_m", "outside_corridor"), nowhere)
+    if _on_path(run.task):
+        followed = path_following(run)
+    success = succeeded(run)
+    lost = run.terminated & (success == 0.0)
+    violated = {}
+    for name in run.task.constraints:
+        broken = during(run, CONSTRAINT + name) > 0.0
+        violated[f"violated_{name}"] = ratio(total(broken), run.steps)
     return {
         **costs(run),
         **steering(run),
-        **undefined,
-        **own,
-        "fuel": fuel_per_distance(run),
+        **followed,
+        **violated,
+        "success": success,
         "heel_deg": largest_heel(run),
         "speed_lost_percent": speed_lost(run),
         "extrapolating": mean(run, "extrapolating"),
         "terminated": lost.astype(np.float64),
         "failed": run.failed.astype(np.float64),
-        "duration_s": run.steps * run.dt,
     }
 
 
-def task_figures(run: Rollout) -> dict[str, Floats]:
-    """Figures that depend on the task, `success` among them."""
-    if _on_path(run.task):
-        return path_following(run)
+def succeeded(run: Rollout) -> Floats:
+    """Flag of each episode, 1 or 0, that says whether it was a success."""
     if "success" in run.infos:
-        return {"success": _ever(run, "success")}
-    if _keeps_course(run.task):
-        kept = ~(run.terminated | run.failed)
-        return {"success": kept.astype(np.float64)}
-
-    # a task of a user's own, which charges ships that are lost
-    end_cost = total(during(run, "reward_end"))
-    charged = end_cost < 0.0
-    kept = ~(charged | run.failed)
-    return {"success": kept.astype(np.float64)}
+        reached: Floats = during(run, "success").max(axis=0, initial=0.0)
+        return reached
+    lost = run.terminated
+    if "heading_error" not in run.task.info_names:
+        # a task of a user's own, which charges ships that are lost
+        lost = total(during(run, "reward_end")) < 0.0
+    kept = ~(lost | run.failed)
+    return kept.astype(np.float64)
 
 
 def costs(run: Rollout) -> dict[str, Floats]:
@@ -127,7 +114,7 @@ def costs(run: Rollout) -> dict[str, Floats]:
 def steering(run: Rollout) -> dict[str, Floats]:
     """Heading error and rudder activity of each episode, see `metrics`."""
     heading_rmse = np.full(len(run.seeds), np.nan)
-    if _keeps_course(run.task):
+    if "heading_error" in run.infos:
         heading_rmse = root_mean_square(run, "heading_error")
 
     minutes = run.steps * run.dt / 60.0
@@ -173,34 +160,6 @@ def reversals(angle: Floats, counts: Flags) -> Floats:
     return number
 
 
-def fuel_per_distance(run: Rollout) -> Floats:
-    """Fuel for each mile made good.
-
-    That of straight running at service speed in calm water is 1. Power is proportional
-    to the cube of the shaft speed (propeller law). The distance counts the speed lost
-    to rudder and drift, the way lengthened by yawing, and the weather. It is no
-    consumption: how the engine answers to load is not modelled. NaN where no way was
-    made good, or the task has neither path nor course, shape (n,).
-    """
-    if not (_on_path(run.task) or _keeps_course(run.task)):
-        return np.full(len(run.seeds), np.nan)
-    model = run.model
-    service = 0.0
-    if "n" in model.state_names:
-        service = model.service_shaft_speed
-
-    # power over that at service speed
-    power = run.sailing.astype(np.float64)
-    if service > 0.0:
-        shaft_speed = during(run, "n") / service
-        power = shaft_speed**3
-
-    spent = total(power) * run.dt
-    made_good = np.maximum(distance_made_good(run), 0.0)
-    in_calm_water = made_good / model.particulars["speed"]
-    return ratio(spent, in_calm_water)
-
-
 def largest_heel(run: Rollout) -> Floats:
     """Largest angle of heel to either side, deg; NaN of a ship without roll."""
     if "phi" not in run.states:
@@ -216,40 +175,14 @@ def speed_lost(run: Rollout) -> Floats:
     return np.asarray(100.0 * lost)
 
 
-def distance_made_good(run: Rollout) -> Floats:
-    """Distance made good, m, shape (n,).
-
-    It is along the path and over ground, or along the ordered course and through the
-    water.
-    """
-    if _on_path(run.task):
-        distance = during(run, "distance_made_good")
-        return np.asarray(distance.max(axis=0, initial=0.0))
-    error = during(run, "heading_error")
-    by_surge = during(run, "u") * np.cos(error)
-    by_sway = during(run, "v") * np.sin(error)
-    return total(by_surge + by_sway) * run.dt
-
-
 def path_following(run: Rollout) -> dict[str, Floats]:
     """Figures of path following of each episode, see `metrics`."""
     is_outside = during(run, "in_corridor") == 0.0
     outside = run.sailing & is_outside
-    left = outside.any(axis=0)
     return {
         "cross_track_rmse_m": root_mean_square(run, "cross_track"),
         "outside_corridor": ratio(total(outside), run.steps),
-        "left_corridor": left.astype(np.float64),
-        "grounded": _ever(run, "grounded"),
-        "success": _ever(run, "success"),
     }
-
-
-def _ever(run: Rollout, name: str) -> Floats:
-    """Flag that says whether another was set in an episode, 1 or 0, shape (n,)."""
-    flags: Flags = during(run, name) > 0.0
-    ever: Floats = np.any(flags, axis=0).astype(np.float64)
-    return ever
 
 
 def during(run: Rollout, name: str) -> Floats:

@@ -16,40 +16,34 @@ from shipgym.plots import Panel, axis, line, panels, points
 from shipgym.plots.style import MUTED, PALETTE, Figure
 from shipgym.tasks.guidance import wrapped
 
-COURSE_ORDERS = (
-    "set_point",
-    "course_order",
-    "heading_order",
-    "desired_course",
-    "los_course",
-)
+DEGREES = 180.0 / np.pi
+FRAMES = 200  # places of the slider
 
 
 class ReplayQuantity(NamedTuple):
-    """A quantity that the page may show over time."""
+    """A quantity that the page shows over time."""
 
     label: str
-    line: str  # series that is drawn
-    order: str = ""  # series of its order, drawn dashed
+    name: str  # of a state, command or entry of `info`
+    factor: float = 1.0  # from SI to the unit that is shown
+    order: str = ""  # name of the angle that is ordered, drawn dotted
 
 
-#: In the order of the page; a quantity that no episode has is left out.
+#: In the order of the page; what no episode has, or is 0 throughout, is left out.
 QUANTITIES = (
-    ReplayQuantity("heading, deg", "psi", order="course_order"),
-    ReplayQuantity("cross-track error, m", "cross_track_error"),
-    ReplayQuantity("heading error, deg", "heading_error"),
-    ReplayQuantity("rudder, deg", "delta", order="rudder_order"),
-    ReplayQuantity("speed through water, m/s", "speed"),
-    ReplayQuantity("yaw rate, deg/s", "yaw_rate"),
-    ReplayQuantity("heel, deg", "heel"),
-    ReplayQuantity("shaft speed, 1/min", "shaft_speed"),
+    ReplayQuantity("heading, deg", "psi", DEGREES, order="set_point"),
+    ReplayQuantity("cross-track error, m", "cross_track"),
+    ReplayQuantity("rudder, deg", "delta", DEGREES, order="delta_order"),
+    ReplayQuantity("speed through water, m/s", "u"),
+    ReplayQuantity("yaw rate, deg/s", "r", DEGREES),
+    ReplayQuantity("heel, deg", "phi", DEGREES),
+    ReplayQuantity("shaft speed, 1/min", "n", 60.0),
     ReplayQuantity("wind speed, m/s", "wind_speed"),
-    ReplayQuantity("wind from, deg", "wind_from"),
-    ReplayQuantity("current speed, m/s", "current_speed"),
-    ReplayQuantity("current towards, deg", "current_towards"),
-    ReplayQuantity("reward so far", "reward_so_far"),
+    ReplayQuantity("wind from, deg", "wind_from", DEGREES),
+    ReplayQuantity("current to the north, m/s", "current_north"),
+    ReplayQuantity("current to the east, m/s", "current_east"),
+    ReplayQuantity("reward so far", "reward"),
 )
-FRAMES = 200  # places of the slider
 
 
 def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
@@ -172,12 +166,10 @@ def _hull(episode: Episode, time: float) -> dict[str, list[float]]:
 
 
 def _histories(runs: Mapping[str, Episode]) -> Figure:
-    """Quantities over time, a panel each: the runs, and their orders dashed."""
+    """Quantities over time, a panel each: the runs, and their orders dotted."""
     series = {name: _series(episode) for name, episode in runs.items()}
-    recorded = {quantity for found in series.values() for quantity in found}
-    shown = [quantity for quantity in QUANTITIES if quantity.line in recorded]
-    parts = sorted({part for episode in runs.values() for part in episode.reward_parts})
-    for part in parts:
+    shown = list(QUANTITIES)
+    for part in sorted({part for run in runs.values() for part in run.reward_parts}):
         words = part.removeprefix("reward_").replace("_", " ")
         shown.append(ReplayQuantity(f"{words}, reward so far", part))
 
@@ -186,92 +178,45 @@ def _histories(runs: Mapping[str, Episode]) -> Figure:
         traces = []
         for number, (name, episode) in enumerate(runs.items()):
             t = episode.dt * np.arange(episode.n_steps + 1)
-            for label, dash in ((quantity.line, "solid"), (quantity.order, "dot")):
-                if label in series[name]:
-                    values = series[name][label]
-                    colour = _colour(number)
-                    traces.append(line(t, values, name, colour, 1.4, line_dash=dash))
-        drawn.append(Panel(traces, "time, s", "", quantity.label))
+            for values, dash in _lines(quantity, series[name]):
+                colour = _colour(number)
+                traces.append(line(t, values, name, colour, 1.4, line_dash=dash))
+        if any(np.any(trace.y) for trace in traces):
+            drawn.append(Panel(traces, "time, s", "", quantity.label))
     return panels(drawn, 190 * ((len(drawn) + 1) // 2) + 80, 2, outer=True)
+
+
+def _lines(
+    quantity: ReplayQuantity, series: Mapping[str, Floats]
+) -> list[tuple[Floats, str]]:
+    """Values of a quantity and of its order, in the unit shown, with their dashes."""
+    if quantity.name not in series:
+        return []
+    values = series[quantity.name]
+    lines = [(quantity.factor * values, "solid")]
+    if quantity.order in series:
+        # without a jump from what follows it
+        ordered = values + wrapped(series[quantity.order] - values)
+        lines.append((quantity.factor * ordered, "dot"))
+    return lines
+
+
+def _series(episode: Episode) -> dict[str, Floats]:
+    """Histories by name, each of shape (n_steps + 1,), SI units."""
+    sums = {"reward": episode.rewards, **episode.reward_parts}
+    held = {name: np.append(v, v[-1:]) for name, v in episode.commands.items()}
+    found = {name: np.append(0.0, np.cumsum(values)) for name, values in sums.items()}
+    found |= {**held, **episode.info, **episode.states}
+    if "delta" in held:
+        found["delta_order"] = held["delta"]
+    heading = np.unwrap(found["psi"])  # from one within 0 to 360 degrees
+    turns = np.floor(heading[0] / (2.0 * np.pi))
+    found["psi"] = heading - 2.0 * np.pi * turns
+    return found
 
 
 def _colour(number: int) -> str:
     return PALETTE[number % len(PALETTE)]
-
-
-def _series(episode: Episode) -> dict[str, Floats]:
-    """Histories that are shown, each of shape (n_steps + 1,); angles in degrees."""
-    states = episode.states
-    recorded = {**episode.info, **states}
-    found: dict[str, Floats] = {
-        "x": states["x"],
-        "y": states["y"],
-        "reward_so_far": np.append(0.0, np.cumsum(episode.rewards)),
-    }
-    for part, values in episode.reward_parts.items():
-        found[part] = np.append(0.0, np.cumsum(values))
-    if "u" in states:
-        found["speed"] = np.hypot(states["u"], states.get("v", 0.0))
-    for name in ("cross_track_error", "cross_track"):
-        if name in recorded:
-            found.setdefault("cross_track_error", recorded[name])
-    return {
-        **found,
-        **_angles(states),
-        **_orders(episode),
-        **_weather(states),
-    }
-
-
-def _angles(states: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Angles of the ship and the course to steer, degrees.
-
-    Headings go through north without a jump, from one within 0 to 360 degrees at the
-    start.
-    """
-    heading = np.unwrap(states["psi"])
-    heading = heading - 2.0 * np.pi * np.floor(heading[0] / (2.0 * np.pi))
-    radians = {"psi": heading, "delta": states["delta"]}
-    if "r" in states:
-        radians["yaw_rate"] = states["r"]
-    if "phi" in states:
-        radians["heel"] = states["phi"]
-    orders = [states[name] for name in COURSE_ORDERS if name in states]
-    if orders:
-        error = wrapped(orders[0] - heading)
-        radians["heading_error"] = error
-        radians["course_order"] = heading + error  # without a jump from the heading
-    return {name: np.degrees(values) for name, values in radians.items()}
-
-
-def _orders(episode: Episode) -> dict[str, Floats]:
-    """Rudder that is ordered, degrees, and shaft speed, 1/min."""
-    found: dict[str, Floats] = {}
-    held = {}  # from a sample on, the last one up to the end
-    for name, values in episode.commands.items():
-        held[name] = np.append(values, values[-1:])
-    if "delta" in held:
-        found["rudder_order"] = np.degrees(held["delta"])
-    shaft_speed = episode.states.get("n", held.get("n"))
-    if shaft_speed is not None:
-        found["shaft_speed"] = 60.0 * shaft_speed
-    return found
-
-
-def _weather(states: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Wind and current where they are recorded and not zero throughout."""
-    found: dict[str, Floats] = {}
-    has_wind = {"wind_speed", "wind_from"} <= states.keys()
-    if has_wind and np.any(states["wind_speed"]):
-        found["wind_speed"] = states["wind_speed"]
-        found["wind_from"] = np.degrees(states["wind_from"]) % 360.0
-    if {"current_north", "current_east"} <= states.keys():
-        north, east = states["current_north"], states["current_east"]
-        drift = np.hypot(north, east)
-        if np.any(drift):
-            found["current_speed"] = drift
-            found["current_towards"] = np.degrees(np.arctan2(east, north)) % 360.0
-    return found
 
 
 def _outcome(episode: Episode) -> str:

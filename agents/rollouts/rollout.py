@@ -14,6 +14,8 @@ from shipgym.arrays import Flags, Floats
 from shipgym.envs.engine import Engine, episode_keys
 from shipgym.tasks.task import Task
 
+Histories = dict[str, Floats]
+
 
 @dataclass(frozen=True, eq=False)
 class Rollout:
@@ -33,15 +35,13 @@ class Rollout:
     sailing : bool array of shape (n_steps, n)
         Whether the episode was running in the interval; what is recorded of the others
         is meaningless.
-    terminated, truncated, failed : bool array of shape (n,)
-        How the episode ended; the last: because the policy gave no command.
+    terminated, failed : bool array of shape (n,)
+        Whether the episode ended before its time, and because the policy gave no
+        command.
     failure : str
         How the policy failed first; empty if it did not.
     seconds_per_action : float
         Process time of `predict` over the number of commands it gave, in a batch.
-    actions, rewards : array of shape (n_steps, n, n_commands), and (n_steps, n)
-        Of each interval; without steps if nothing was recorded. The rewards are those
-        of an environment made with `bounded=False`, minus the costs.
     states, infos : dict of str to array of shape (n_steps + 1, n)
         Physical states and entries of `info` that were recorded, from the beginning on.
     """
@@ -53,12 +53,9 @@ class Rollout:
     costs: Floats
     sailing: Flags
     terminated: Flags
-    truncated: Flags
     failed: Flags
     failure: str
     seconds_per_action: float
-    actions: NDArray[np.float32]
-    rewards: Floats
     states: dict[str, Floats]
     infos: dict[str, Floats]
 
@@ -100,26 +97,59 @@ def rollout(
         What the policy is shown in place of the observations; asked before each
         command.
     """
-    log = _Log(engine, record)
+    n = engine.num_envs
     helmsman = _Helmsman(policy, tolerant)
     observations = engine.begin(episode_keys(seeds), 0)
-    log.look()
-
-    starts = log.sailing
-    while log.sailing.any():
-        seen = observations
-        if show is not None:
-            seen = show(observations)
-        commands, missing = helmsman.steer(
-            seen, starts, log.sailing, len(engine.command)
-        )
-        log.give_up(missing)
-        if not log.sailing.any():  # the policy has failed in all episodes
+    looks = [_look(engine, record)]
+    sailing = starts = np.ones(n, dtype=np.bool_)
+    ended = failed = np.zeros(n, dtype=np.bool_)
+    costs = np.zeros(n)
+    sailed: list[Flags] = []
+    while sailing.any():
+        seen = observations if show is None else show(observations)
+        commands, missing = helmsman.steer(seen, starts, sailing, len(engine.command))
+        failed = failed | missing
+        sailing = sailing & ~missing
+        if not sailing.any():  # the policy has failed in all episodes
             break
         observations, _, terminated, truncated = engine.step(commands)
-        log.note(commands, terminated, truncated)
+        sailed.append(sailing)
+        costs += np.where(sailing, engine.info("cost"), 0.0)
+        ended = ended | (sailing & terminated)
+        looks.append(_look(engine, record))
+        sailing = sailing & ~(terminated | truncated)
         starts = np.zeros_like(starts)
-    return log.rollout(np.asarray(seeds), helmsman)
+    return Rollout(
+        task=engine.task,
+        model=engine.model,
+        dt=engine.dt,
+        seeds=np.asarray(seeds),
+        costs=costs,
+        sailing=np.array(sailed, dtype=np.bool_).reshape(-1, n),
+        terminated=ended,
+        failed=failed,
+        failure=helmsman.failure,
+        seconds_per_action=helmsman.seconds / max(helmsman.n_commands, 1),
+        states=_stacked([states for states, _ in looks]),
+        infos=_stacked([infos for _, infos in looks]),
+    )
+
+
+def _look(
+    engine: Engine, record: bool | Collection[str]
+) -> tuple[Histories, Histories]:
+    """Physical states and entries of `info` that are recorded, now."""
+    if not record:
+        return {}, {}
+    states = {}
+    for name, values in engine.physical_state().items():
+        if record is True or name in record:
+            states[name] = np.array(values)
+    infos = {}
+    for name in engine.task.info_names:
+        if record is True or name in record:
+            infos[name] = engine.info(name).copy()
+    return states, infos
 
 
 def episode_costs(policy: Policy, engine: Engine, seeds: NDArray[np.int64]) -> Floats:
@@ -199,99 +229,6 @@ def _no_number(values: NDArray[np.float32], missing: Flags, sailing: Flags) -> s
     )
 
 
-class _Log:
-    """Record of the episodes so far."""
-
-    def __init__(self, engine: Engine, record: bool | Collection[str]) -> None:
-        self.engine = engine
-        self.record = record
-
-        none: Flags = np.zeros(engine.num_envs, dtype=np.bool_)
-        self.sailing = ~none
-        self.terminated = none
-        self.truncated = none
-        self.failed = none
-        self.costs = np.zeros(engine.num_envs)
-
-        self.sailed: list[Flags] = []
-        self.actions: list[NDArray[np.float32]] = []
-        self.rewards: list[Floats] = []
-        self.states: list[dict[str, Floats]] = []
-        self.infos: list[dict[str, Floats]] = []
-
-    def _keeps(self, name: str) -> bool:
-        return self.record if isinstance(self.record, bool) else name in self.record
-
-    def look(self) -> None:
-        """Record where the ships are."""
-        if not self.record:
-            return
-        states = {}
-        for name, values in self.engine.physical_state().items():
-            if self._keeps(name):
-                states[name] = values
-        self.states.append(states)
-
-        infos = {}
-        for name in self.engine.task.info_names:
-            if self._keeps(name):
-                infos[name] = self.engine.info(name).copy()
-        self.infos.append(infos)
-
-    def give_up(self, missing: Flags) -> None:
-        """End episodes whose ships got no command."""
-        self.failed = self.failed | missing
-        self.sailing = self.sailing & ~missing
-
-    def note(
-        self,
-        command: NDArray[np.float32],
-        terminated: Flags,
-        truncated: Flags,
-    ) -> None:
-        """Note what came of an interval."""
-        rewards = -self.engine.info("cost")
-        self.sailed.append(self.sailing)
-        self.costs -= np.where(self.sailing, rewards, 0.0)
-        self.terminated = self.terminated | (self.sailing & terminated)
-        self.truncated = self.truncated | (self.sailing & truncated)
-        if self.record:
-            self.actions.append(command)
-            self.rewards.append(rewards)
-        self.look()
-        self.sailing = self.sailing & ~(terminated | truncated)
-
-    def rollout(self, seeds: NDArray[np.int64], helmsman: _Helmsman) -> Rollout:
-        """All that was noted."""
-        engine = self.engine
-        n = engine.num_envs
-        n_commands = len(engine.command)
-        actions = np.array(self.actions, dtype=np.float32)
-        return Rollout(
-            task=engine.task,
-            model=engine.model,
-            dt=engine.dt,
-            seeds=seeds,
-            costs=self.costs,
-            sailing=np.array(self.sailed, dtype=np.bool_).reshape(-1, n),
-            terminated=self.terminated,
-            truncated=self.truncated,
-            failed=self.failed,
-            failure=helmsman.failure,
-            seconds_per_action=helmsman.seconds / max(helmsman.n_commands, 1),
-            actions=actions.reshape(-1, n, n_commands),
-            rewards=np.array(self.rewards).reshape(-1, n),
-            states=_stacked(self.states),
-            infos=_stacked(self.infos),
-        )
-
-
-def _stacked(records: list[dict[str, Floats]]) -> dict[str, Floats]:
+def _stacked(records: list[Histories]) -> Histories:
     """Histories by name, each of shape (n_records, n)."""
-    if not records:
-        return {}
-    histories = {}
-    for name in records[0]:
-        values = [record[name] for record in records]
-        histories[name] = np.array(values)
-    return histories
+    return {name: np.array([one[name] for one in records]) for name in records[0]}

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from agents.controllers.controller import Controller
-from agents.rollouts.metrics import path_following
+from agents.rollouts.metrics import root_mean_square, succeeded
 from agents.rollouts.rollout import Rollout, rollout
 from shipgym.arrays import Flags, Floats
 from shipgym.envs.engine import Engine
@@ -76,11 +76,8 @@ def keep_track(guide: Controller, models: Sequence[ShipModel]) -> Track:
         "cross_track",
         "distance_made_good",
         "success",
-        "in_corridor",
-        "grounded",
     )
     run = rollout(guide, engine, seeds, record=recorded)
-    figures = path_following(run)
 
     x = _of_first(run, run.states["x"])
     y = _of_first(run, run.states["y"])
@@ -92,8 +89,8 @@ def keep_track(guide: Controller, models: Sequence[ShipModel]) -> Track:
         positions=np.column_stack([x, y]),
         cross_track=cross_track,
         largest=_largest_error(run),
-        rms=figures["cross_track_rmse_m"],
-        arrived=figures["success"] > 0.0,
+        rms=root_mean_square(run, "cross_track"),
+        arrived=succeeded(run) > 0.0,
     )
 
 

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import io
 import json
-from dataclasses import asdict
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,18 +16,8 @@ import numpy as np
 from rich.console import Console
 
 from agents import load_agent, load_results
-from agents.benchmarking.cells import Cell, job_of, run_job
-from agents.benchmarking.entries import Entry
-from agents.benchmarking.results import collect
 from agents.cli.benchmark_tables import costs_table, ranking_table
-from agents.job_results import (
-    KeptResults,
-    job_to_json,
-    result_from_json,
-    result_to_json,
-)
-from agents.jobs import JobEngine, run_jobs
-from agents.suites.suite import load_suite, parse_suite
+from agents.suites.suite import parse_suite
 from agents.training.plan import TrainingPlan, make_plan, training_options
 from agents.training.run_folder import resumed
 from agents.training.settings import load_settings, read_settings_file
@@ -39,7 +27,6 @@ from shipgym.files import LARGEST_TOML, read_bytes
 from shipgym.trials.guesses import guess_trial
 
 SHOWN = Console(file=io.StringIO(), width=120)
-JOBS: list[dict[str, Any]] = [{"number": 1}]
 
 
 def written(fields: Any) -> None:
@@ -124,58 +111,6 @@ def read_settings(path: Path) -> Any:
     return load_settings("ppo", given=read_settings_file(path, "ppo")).to_dict()
 
 
-def squared(job: dict[str, Any]) -> dict[str, Any]:
-    """A job."""
-    return {"squares": np.arange(3.0) ** job["number"], "lowest": np.inf, "name": "a"}
-
-
-def keep_results(folder: Path) -> None:
-    """Results of jobs, as a benchmark or a study that goes on finds them."""
-    run_jobs(squared, JOBS, JobEngine(keep=folder))
-
-
-def read_kept(path: Path) -> Any:
-    """Jobs of which some are done."""
-    folder, text = path.parent, job_to_json(JOBS[0], "job")
-    kept = KeptResults(folder, squared).load(text)
-    return None if kept is None else run_jobs(squared, JOBS, JobEngine(keep=folder))
-
-
-SUITE = load_suite()
-TASK = SUITE.task("sharp-turns")
-ENTRY = Entry("pid", "pid")
-EPISODES = 3
-
-
-@cache
-def cell_job() -> str:
-    """A cell of a benchmark, as JSON."""
-    return job_to_json(job_of(ENTRY, TASK, EPISODES), "job")
-
-
-def keep_cell(folder: Path) -> None:
-    """What a benchmark that goes on finds."""
-    figures = {
-        "cost": np.array([[1.0, 2.0, 3.0]] * 2),
-        "success": np.array([[1.0, 0.0, np.nan]] * 2),
-        "terminated": np.zeros((2, 3)),
-        "failed": np.zeros((2, 3)),
-    }
-    cell = Cell(figures=figures, seconds_per_action=1e-6)
-    result = result_to_json(asdict(cell))
-    KeptResults(folder, run_job).save(cell_job(), result)
-
-
-def read_cell(path: Path) -> Any:
-    """A benchmark of cells that are done."""
-    kept = KeptResults(path.parent, run_job).load(cell_job())
-    if kept is None:
-        return None
-    cell = Cell.from_dict(result_from_json(kept), EPISODES, "cell")
-    cells = {(ENTRY.name, TASK.name): cell}
-    return collect(SUITE, [TASK], [ENTRY], cells, "pid", {TASK.name: cell})
-
-
 KINDS = (
     Kind(
         "ship-file",
@@ -194,6 +129,4 @@ KINDS = (
     Kind("run", read_run, use_plan, main="run.json", slow=8),
     Kind("suite", read_suite, slow=2),
     Kind("settings", read_settings, slow=8),
-    Kind("cell", read_cell, use_results, prepare=keep_cell, slow=10),
-    Kind("kept-result", read_kept, prepare=keep_results),
 )

@@ -1,13 +1,9 @@
 """Jobs give the same results wherever they run, are kept, and fail with one message."""
 
 import os
-import signal
-import subprocess
 import sys
-import time
 import traceback
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -59,11 +55,6 @@ def loaded(job):
     import joblib
 
     return [spectrum(job), "lz4" in sys.modules, os.getcwd()]
-
-
-def sleeps(job):
-    Path(job["pids"], str(os.getpid())).touch()
-    time.sleep(600)
 """
 needs_ray = pytest.mark.skipif(find_spec("ray") is None, reason="ray is not installed")
 
@@ -174,39 +165,6 @@ def test_the_error_of_a_job_names_it(workers, functions, tmp_path):
     assert "return 1 / job" in "".join(lines)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_workers_end_with_the_process_that_started_them(functions, tmp_path, number):
-    pids = tmp_path / "pids"
-    pids.mkdir()
-    script = tmp_path / "home" / "script.py"
-    script.write_text(
-        "import job_functions, signal, sys\n"
-        "from agents.jobs import JobEngine, run_jobs\n"
-        "if __name__ == '__main__':\n"
-        "    signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "    jobs = [{'k': k, 'pids': sys.argv[1]} for k in range(2)]\n"
-        "    try:\n"
-        "        run_jobs(job_functions.sleeps, jobs, JobEngine(workers=2))\n"
-        "    except KeyboardInterrupt:\n"
-        "        sys.exit(130)\n"
-    )
-    expected = {signal.SIGINT: 130, signal.SIGKILL: -signal.SIGKILL}
-    environment = {**os.environ, "PYTHONPATH": str(Path.cwd())}
-    with subprocess.Popen([sys.executable, script, pids], env=environment) as parent:
-        end = time.monotonic() + 60
-        while len(list(pids.iterdir())) < 2 and time.monotonic() < end:
-            time.sleep(0.05)
-        parent.send_signal(number)
-        try:
-            assert parent.wait(timeout=30) == expected[number]
-        finally:
-            parent.kill()
-    end = time.monotonic() + 10
-    while any(Path("/proc", entry.name).exists() for entry in pids.iterdir()):
-        assert time.monotonic() < end
-        time.sleep(0.05)
-
-
 @pytest.mark.parametrize(
     ("function", "job", "message"),
     [
@@ -225,13 +183,6 @@ def test_wrong_engines_are_refused():
         JobEngine("rai")
     with pytest.raises(InputError, match="it is for engine 'ray'"):
         JobEngine(address="10.0.0.1:6379")
-
-
-@needs_ray
-@pytest.mark.parametrize("address", ["10.0.0.1", "127.0.0.1:1"])
-def test_an_address_that_does_not_answer_is_refused(address):
-    with pytest.raises(EngineError, match=r"expected .* at 'HOST:PORT'"):
-        run_jobs(os.path.join, [{}], JobEngine("ray", address=address))
 
 
 def test_without_ray_its_engine_says_how_to_install_it(monkeypatch):

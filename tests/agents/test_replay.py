@@ -9,7 +9,6 @@ from typer.testing import CliRunner
 from agents.cli import app
 from agents.rollouts import write_replay
 from shipgym import Episode, InputError
-from tests.agents.browser import COMMAND, Browser
 
 STEPS, DT = 40, 5.0
 END = STEPS * DT
@@ -109,7 +108,6 @@ def test_a_page_shows_what_was_recorded_in_the_units_that_are_read(shown):
     expected = {
         "heading, deg": (0.0, turned),
         "cross-track error, m": (20.0, 20.0),
-        "heading error, deg": (np.degrees(0.1), np.degrees(0.1) - turned),
         "rudder, deg": (0.0, 10.0 * np.sin(END / 20.0)),
         "speed through water, m/s": (5.0, 5.0),
         "yaw rate, deg/s": (np.degrees(0.002), np.degrees(0.002)),
@@ -117,8 +115,7 @@ def test_a_page_shows_what_was_recorded_in_the_units_that_are_read(shown):
         "shaft speed, 1/min": (60.0, 90.0),
         "wind speed, m/s": (8.0, 8.0),
         "wind from, deg": (90.0, 90.0),
-        "current speed, m/s": (0.5, 0.5),
-        "current towards, deg": (270.0, 270.0),
+        "current to the east, m/s": (-0.5, -0.5),
         "reward so far": (0.0, -0.5 * STEPS),
         "cross track, reward so far": (0.0, -0.4 * STEPS),
         "rudder, reward so far": (0.0, -0.1 * STEPS),
@@ -151,10 +148,8 @@ def test_the_ship_moves_through_the_frames_to_its_end(shown):
     assert frames[0]["data"][0]["x"][1] == 30.0  # half a beam to starboard
 
 
-@pytest.mark.parametrize(
-    "name", ["</script><script>alert(1)//", "<!--<script>", "$data ${t}"]
-)
-def test_no_name_breaks_the_page(tmp_path, name):
+def test_no_name_breaks_the_page(tmp_path):
+    name = "</script><script>alert(1)//<!--<script>$data ${t}"
     plain = tmp_path / "plain.json"
     episode().save(plain)
     write_replay([plain], tmp_path / "plain.html")
@@ -165,25 +160,6 @@ def test_no_name_breaks_the_page(tmp_path, name):
     assert page.count("</script>") == expected
     assert "<script>alert" not in page
     assert "default-src 'none'" in page  # it loads nothing
-
-
-@pytest.mark.skipif(COMMAND is None, reason="no chromium is installed")
-def test_a_browser_without_network_moves_the_ship(shown, tmp_path):
-    shown()
-    page = (tmp_path / "replay.html").as_uri()
-    browser = Browser()
-    try:
-        browser.open(page)
-        plot = "document.getElementById('plot-chart-figure')"
-        browser.wait(f"{plot}?._transitionData?._frames?.length === 200")
-        end = f"Plotly.animate({plot}, ['{END:.1f}'], {{ mode: 'immediate' }})"
-        browser.run(f"void {end}")
-        north = f"{plot}.data.at(-1).y[0]"
-        browser.wait(f"{north} > {5.0 * END}")
-        assert browser.complaints == []
-        assert browser.requests == [page]
-    finally:
-        browser.close()
 
 
 def shipgym(*arguments):
