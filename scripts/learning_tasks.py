@@ -22,7 +22,7 @@ import cma
 import gymnasium
 import numpy as np
 
-from agents.training.plan import TrainingRequest, make_plan
+from agents.training.plan import make_plan
 from agents.training.training import train
 from shipgym.arrays import Floats
 from shipgym.files import make_folder, read_json, write_json
@@ -105,10 +105,7 @@ def searched(task: Any, rule: Any, seconds: float, seed: int) -> tuple[Floats, i
 def learned(task: Any, name: str, seed: int) -> Law:
     """Agent that has learned, as `costs` takes it."""
     algorithm, settings = AGENTS[name]
-    request = TrainingRequest(
-        algorithm, environment=task.ID, seed=seed, settings=settings
-    )
-    policy = train(make_plan(request)).policy
+    policy = train(make_plan(algorithm, task.ID, seed=seed, settings=settings)).policy
 
     def act(seen: Floats, memory: Any) -> tuple[Floats, Any]:
         command, memory = policy.predict(seen, memory)

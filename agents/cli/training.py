@@ -4,32 +4,20 @@ from __future__ import annotations
 
 import shlex
 import sys
-from dataclasses import asdict
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
-from agents.cli.command import (
-    INTERRUPTED,
-    Address,
-    AllowCode,
-    EngineName,
-    Workers,
-    fail,
-)
+from agents.cli.command import INTERRUPTED, fail
 from agents.cli.parameters import with_options
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from agents.controllers.interface import Policy
     from agents.training.evaluation import TrainingResult
     from agents.training.plan import TrainingPlan
-    from agents.training.tuning import TuningResult, TuningTrial
 
-Algorithm = Annotated[str, Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")]
+Algorithm = Annotated[str, Argument(metavar="ALGORITHM", help="ppo or sac.")]
 Environment = Annotated[
     str | None,
     Option(
@@ -46,10 +34,6 @@ Model = Annotated[
 Sea = Annotated[str | None, Option(help="calm (default), slight, moderate or rough.")]
 TaskName = Annotated[
     str | None, Option(help="A benchmark task, instead of --env, --model and --sea.")
-]
-SuiteName = Annotated[
-    str | None,
-    Option(help="Suite of the task, a name or your TOML file; default: shipgym-v1."),
 ]
 EnvironmentOptions = Annotated[
     list[str] | None,
@@ -69,6 +53,7 @@ Settings = Annotated[
     Path | None,
     Option(metavar="FILE.TOML", help="Settings that override the tuned ones."),
 ]
+Seed = Annotated[int, Option(min=0, max=799, help="Random seed.")]
 Setting = Annotated[
     list[str] | None,
     Option(
@@ -80,16 +65,6 @@ Setting = Annotated[
         ),
     ),
 ]
-Randomise = Annotated[
-    bool | None,
-    Option(
-        "--randomise",
-        help=(
-            "Domain randomisation: ships drawn from the covariance, all seas, all"
-            " speeds."
-        ),
-    ),
-]
 
 
 def learning_options(
@@ -98,126 +73,63 @@ def learning_options(
     model: Model = None,
     sea: Sea = None,
     task: TaskName = None,
-    suite: SuiteName = None,
-    allow_code: AllowCode = None,
     environment_options: EnvironmentOptions = None,
     total_steps: TotalSteps = None,
     settings: Settings = None,
     set_: Setting = None,
-    randomise: Randomise = None,
 ) -> dict[str, Any]:
-    """Fields of a `TrainingRequest` that `train` and `tune` are given."""
-    overrides = _named(set_, "--set")
+    """Arguments of `make_plan` that `train` and `tune` are given."""
+    from shipgym.files import named_values
+
+    own = named_values(set_ or (), "--set", "gamma=0.98")
     if total_steps is not None:
-        overrides["total_steps"] = total_steps
-    fields = {
+        own["total_steps"] = total_steps
+    return {
         "algorithm": algorithm,
         "environment": env,
         "model": model,
         "sea": sea,
         "task": task,
-        "suite": suite,
-        "options": _named(environment_options, "--option"),
+        "options": named_values(environment_options or (), "--option", "noise=1"),
         "settings_file": settings,
-        "settings": overrides,
-        "randomise": randomise,
-        "allow_code": allow_code,
+        "settings": own,
     }
-    return {name: value for name, value in fields.items() if value is not None}
 
 
-with_learning_options = with_options(learning_options, "fields")
+with_learning_options = with_options(learning_options, "asked")
 
 
 @with_learning_options
 def train_command(
     out: Annotated[Path, Option(metavar="FOLDER", help="Folder of the run.")],
     *,
-    fields: dict[str, Any],
-    seed: Annotated[
-        int | None, Option(min=0, max=799, help="Random seed; default: 0.")
-    ] = None,
-    threads: Annotated[
-        int | None, Option(min=1, help="Threads for torch and the ships; default: 1.")
-    ] = None,
+    asked: dict[str, Any],
+    seed: Seed = 0,
+    threads: Annotated[int, Option(min=1, help="Threads for torch and the ships.")] = 1,
     resume: Annotated[
         bool, Option("--resume", help="Continue the run in the folder.")
     ] = False,
-    compare: Annotated[
-        str | None,
-        Option(
-            metavar="CONTROLLERS",
-            help=(
-                "Yardsticks beside no action, random ones, the rule of the task and LQ:"
-                " rule, or as `benchmark --controllers` takes them."
-            ),
-        ),
-    ] = None,
 ) -> None:
     """Train an autopilot by reinforcement learning.
 
     Writes policy, learning curve and checkpoints. Prints what an episode cost before
     and after, and what it costs with other controllers.
 
-    A run killed at any moment resumes with --resume from its last save, about a minute
-    old at most. With --resume, options that are not given keep their values; others
-    must be the same.
+    A run killed at any moment continues with the same command and --resume from its
+    last save, about a minute old at most.
     """
-    more = {"seed": seed, "threads": threads}
-    fields |= {name: value for name, value in more.items() if value is not None}
-    plan = _checked_plan(fields, out, resume)
-    compared = _compared(plan, compare)
-    _print_result(_train(plan, out, resume, compared), out)
+    from agents.training.plan import make_plan
+
+    plan = make_plan(**asked, seed=seed, threads=threads)
+    _print_result(_train(plan, out, resume), out)
 
 
-def _named(texts: list[str] | None, option: str) -> dict[str, Any]:
-    """Values of a repeatable option NAME=VALUE by name."""
-    from shipgym.files import named_values
-
-    return named_values(texts or (), option, "gamma=0.98")
-
-
-def _checked_plan(fields: dict[str, Any], out: Path, resume: bool) -> TrainingPlan:
-    """Plan of a new or a resumed run, before anything is written."""
-    from agents.cli.terminal import warn
-    from agents.training import run_folder
-    from agents.training.plan import TrainingRequest, make_plan
-
-    if resume:
-        plan = make_plan(run_folder.resumed(out, fields))
-        run_folder.check_resumable(out, plan)
-    else:
-        run_folder.check_new(out)
-        plan = make_plan(TrainingRequest(**fields))
-
-    steps = fields["settings"].get("total_steps", 0)
-    if steps % plan.settings.rollout:
-        warn(
-            f"total_steps: {steps:,} is rounded up to {plan.settings.all_decisions:,}:"
-            f" a rollout of all ships has {plan.settings.rollout:,} steps"
-        )
-    return plan
-
-
-def _compared(plan: TrainingPlan, names: str | None) -> dict[str, Policy]:
-    """Further yardsticks by name, before anything is trained."""
-    if names is None:
-        return {}
-    from agents.benchmarking.entries import read_entries
-
-    policies = {}
-    for entry in read_entries(names):
-        policies[entry.name], *_ = entry.policies(plan.task)
-    return policies
-
-
-def _train(
-    plan: TrainingPlan, out: Path, resume: bool, compared: Mapping[str, Policy]
-) -> TrainingResult:
+def _train(plan: TrainingPlan, out: Path, resume: bool) -> TrainingResult:
     from agents.cli.terminal import training_bar
     from agents.training.run_folder import CHECKPOINT
     from agents.training.training import train
 
+    words = ["shipgym", *sys.argv[1:]]
     try:
         with training_bar() as on_progress:
             return train(
@@ -225,13 +137,12 @@ def _train(
                 out,
                 resume=resume,
                 on_progress=on_progress,
-                compared=compared,
-                command=shlex.join(["shipgym", *sys.argv[1:]]),
+                command=shlex.join(words),
             )
     except KeyboardInterrupt:
         message = "interrupted"
         if (out / CHECKPOINT).is_file():
-            message += f"; continue with --resume --out {out}"
+            message += "; continue with the same command and --resume"
         fail(message, INTERRUPTED)
 
 
@@ -245,16 +156,15 @@ def _print_result(result: TrainingResult, out: Path) -> None:
     if result.resumed_from is not None:
         say(f"resumed at step {result.resumed_from:,}")
     table = plain_table("Mean cost of an episode held out", "", ">cost")
-    best = f"trained: best policy, step {result.best_steps:,} of {result.steps:,}"
-    costs = {"before training": result.first_cost, best: result.best_cost}
-    for name, cost in {**costs, **result.yardsticks}.items():
+    first, last, best = result.curve[0], result.curve[-1], result.best
+    costs = {
+        "before training": first["cost"],
+        f"best policy, step {best['steps']:,} of {last['steps']:,}": best["cost"],
+        **result.yardsticks,
+    }
+    for name, cost in costs.items():
         table.add_row(name, f"{cost:.6g}")
     console.print(table)
-    reached = result.lq_reached
-    if reached is not None:
-        steps = reached["steps"]
-        seconds = reached["seconds"]
-        say(f"LQ's cost reached at step {steps:,}, after {seconds:.0f} s")
     say(f"written: {agent}")
 
 
@@ -265,16 +175,11 @@ def tune_command(
         Option(metavar="FOLDER", help="Folder of the study; resumed if it exists."),
     ],
     *,
-    fields: dict[str, Any],
+    asked: dict[str, Any],
     trials: Annotated[
         int, Option(min=1, help="Trials in all, with those already done.")
     ] = 20,
-    seed: Annotated[
-        int, Option(min=0, max=799, help="Random seed of trainings and search.")
-    ] = 0,
-    engine: EngineName = "local",
-    workers: Workers = 1,
-    address: Address = None,
+    seed: Seed = 0,
 ) -> None:
     """Search the settings with which an agent learns best.
 
@@ -283,18 +188,10 @@ def tune_command(
     If it is killed, the same command continues with the trials that are not done.
     """
     from agents.cli.terminal import progress_bars
-    from agents.jobs import JobEngine
-    from agents.training.plan import TrainingRequest, make_plan
+    from agents.training.plan import make_plan
     from agents.training.tuning import tune
 
-    fixed = sorted(fields["settings"].keys() - {"total_steps"})
-    plan = make_plan(TrainingRequest(**fields, seed=seed))
-    if "evaluate_every" not in fixed:
-        # ten evaluations on the way, which early stopping needs
-        every = max(1, plan.settings.total_steps // 10)
-        fields["settings"]["evaluate_every"] = every
-        plan = make_plan(TrainingRequest(**fields, seed=seed))
-
+    plan = make_plan(**asked, seed=seed)
     try:
         with progress_bars() as bars:
 
@@ -302,53 +199,48 @@ def tune_command(
                 if bars is not None:
                     bars("trials", done, total)
 
-            tuning = tune(
-                plan,
-                out,
-                trials,
-                fixed=fixed,
-                where=JobEngine(engine, workers, address),
-                on_progress=on_progress,
+            study = tune(
+                plan, out, trials, fixed=asked["settings"], on_progress=on_progress
             )
     except KeyboardInterrupt:
         fail(
             "interrupted; the same command continues with the trials that are not done",
             INTERRUPTED,
         )
-    print_tuning(tuning, out)
+    print_tuning(study, out)
 
 
-def print_tuning(tuning: TuningResult, out: Path) -> None:
-    """Print trials and where the best settings are."""
+def print_tuning(study: Any, out: Path) -> None:
+    """Print the trials of a study and where the best settings are."""
     from agents.cli.tables import number, plain_table
     from agents.cli.terminal import answer, console, say
     from agents.training.tuning import BEST
 
     best = out / BEST
-    trials = [asdict(trial) for trial in tuning.trials]
-    answer({"trials": trials, "best": tuning.best.number, "settings": str(best)})
-
+    trials = [
+        {
+            "number": trial.number,
+            "cost": trial.value,
+            "ended": trial.state.name.lower(),
+            "parameters": trial.params,
+        }
+        for trial in study.trials
+    ]
+    answer({"trials": trials, "best": study.best_trial.number, "settings": str(best)})
     title = "Trials by the mean cost of a held-out episode, best first"
     table = plain_table(title, ">trial", ">cost", "ended", "what was varied")
-    for trial in sorted(tuning.trials, key=_rank):
+    for trial in sorted(trials, key=_rank):
+        varied = [f"{name} {value}" for name, value in trial["parameters"].items()]
         table.add_row(
-            str(trial.number),
-            number(trial.cost, 3),
-            trial.ended,
-            _varied(trial.parameters),
+            str(trial["number"]),
+            number(trial["cost"], 3),
+            trial["ended"],
+            ", ".join(varied) or "nothing: as it was",
         )
     console.print(table)
     say(f"\nwritten: {best}")
 
 
-def _rank(trial: TuningTrial) -> float:
+def _rank(trial: dict[str, Any]) -> float:
     """Cost of a trial; those without one come last."""
-    return inf if trial.cost is None else trial.cost
-
-
-def _varied(parameters: Mapping[str, Any]) -> str:
-    varied = []
-    for name, value in parameters.items():
-        text = f"{value:.3g}" if isinstance(value, float) else str(value)
-        varied.append(f"{name} {text}")
-    return ", ".join(varied) or "nothing: as it was"
+    return inf if trial["cost"] is None else float(trial["cost"])

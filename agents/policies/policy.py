@@ -55,6 +55,20 @@ class PolicyMemory(NamedTuple):
     in_force: Numbers  # the same, limited in rate, (n, n_outputs)
 
 
+#: Axes of the arrays of a memory, after those of the ships.
+WIDTHS = {"seen": 2, "left": 1, "output": 1, "in_force": 1}
+#: Fields of a policy that its file holds as they are.
+PLAIN = (
+    "observation_names",
+    "observation_scales",
+    "action",
+    "frame_stack",
+    "authority",
+    "action_repeat",
+    "rate_limit",
+)
+
+
 @dataclass(frozen=True, eq=False)
 class LearnedPolicy:
     """A learned autopilot with `predict` as in `Controller`; steers without torch.
@@ -275,15 +289,13 @@ class LearnedPolicy:
             )
         checked_memory(state.seen, (*shape, past, n_observed))
 
-        begins = checked_starts(starts, (n,))[:, None]
+        begins = checked_starts(starts, (n,))
         kept = _shaped(state, (n,))
-        return PolicyMemory(
-            seen=np.where(begins[:, None], fresh.seen, kept.seen),
-            base=kept.base,
-            left=np.where(begins, fresh.left, kept.left),
-            output=np.where(begins, fresh.output, kept.output),
-            in_force=np.where(begins, fresh.in_force, kept.in_force),
-        )
+        for name, width in WIDTHS.items():
+            here = begins.reshape(n, *[1] * width)
+            array = np.where(here, getattr(fresh, name), getattr(kept, name))
+            kept = kept._replace(**{name: array})
+        return kept
 
     def check_fits(
         self, names: Sequence[str], scales: Sequence[float], where: str = "observations"
@@ -338,25 +350,26 @@ class LearnedPolicy:
 
     def file_fields(self) -> tuple[dict[str, Any], Tensors]:
         """Content of its JSON, and its weights by name."""
-        network, tensors = network_fields(self.network)
-        base = None if self.base is None else self.base.to_dict()
+        tensors = Tensors()
+        for i, layer in enumerate(self.network.layers):
+            for part, numbers in layer._asdict().items():
+                tensors[f"layers.{i}.{part}"] = np.ascontiguousarray(numbers)
+        network = self.network
         content = {
             "format": FORMAT,
             "kind": "learned",
-            "observation_names": list(self.observation_names),
-            "observation_scales": list(self.observation_scales),
-            "action": self.action,
-            "network": network,
-            "frame_stack": self.frame_stack,
-            "base": base,
-            "authority": self.authority,
-            "action_repeat": self.action_repeat,
-            "rate_limit": self.rate_limit,
-            "environment": {"id": self.env_id, "options": as_json(self.env_options)},
+            **{name: getattr(self, name) for name in PLAIN},
+            "network": {
+                "activation": network.activation,
+                "output": network.output,
+                "sizes": network.sizes,
+            },
+            "base": None if self.base is None else self.base.to_dict(),
+            "environment": {"id": self.env_id, "options": self.env_options},
             "model": {"name": self.model_name, "sha256": self.model_sha256},
-            "training": as_json(self.training),
+            "training": self.training,
         }
-        return content, tensors
+        return as_json(content), tensors
 
 
 def check_part(agent: Any) -> None:
@@ -383,30 +396,11 @@ def combined(proposed: Any, part: Any, authority: float) -> Any:
 
 def _shaped(memory: PolicyMemory, shape: tuple[int, ...]) -> PolicyMemory:
     """Memory with other first axes: (n,) ships, or () for a single one."""
-    *_, past, n_observed = memory.seen.shape
-    *_, n_outputs = memory.output.shape
-    return PolicyMemory(
-        seen=memory.seen.reshape(*shape, past, n_observed),
-        base=memory.base,
-        left=memory.left.reshape(*shape, 1),
-        output=memory.output.reshape(*shape, n_outputs),
-        in_force=memory.in_force.reshape(*shape, n_outputs),
-    )
-
-
-def network_fields(network: Network) -> tuple[dict[str, Any], Tensors]:
-    """Description of a network in a policy's JSON, and its weights by name."""
-    tensors = Tensors()
-    for i, layer in enumerate(network.layers):
-        for part, numbers in layer._asdict().items():
-            tensors[f"layers.{i}.{part}"] = np.ascontiguousarray(numbers)
-
-    described = {
-        "activation": network.activation,
-        "output": network.output,
-        "sizes": list(network.sizes),
-    }
-    return described, tensors
+    shaped = {}
+    for name, width in WIDTHS.items():
+        array = getattr(memory, name)
+        shaped[name] = array.reshape(*shape, *array.shape[-width:])
+    return memory._replace(**shaped)
 
 
 def order_numbers(action: ArrayLike) -> NDArray[np.int64]:

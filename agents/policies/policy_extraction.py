@@ -1,12 +1,12 @@
 """Fields of a `LearnedPolicy` from a trained agent of stable-baselines3.
 
 PPO and A2C have the mean of their action, SAC and TQC the hyperbolic tangent of it, TD3
-and DDPG a network that ends so. An agent that commands otherwise than these layers, as
-one with an extractor of features does, is refused.
+and DDPG a network that ends so, DQN the value of each discrete order. An agent that
+commands otherwise than these layers, as one with an extractor of features does, is
+refused.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import count
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -32,12 +32,14 @@ class Actor(NamedTuple):
     output: str  # what follows it
     activation: str  # usual one between the layers
 
-    @property
-    def first_weight(self) -> str:
-        """Weight by which a policy of this kind is known."""
-        return f"{self.head or self.body + '.0'}.weight"
 
-
+#: Of PPO and A2C; SAC and TQC; TD3 and DDPG; DQN.
+ACTORS = (
+    Actor("mlp_extractor.policy_net", "action_net", "linear", "Tanh"),
+    Actor("actor.latent_pi", "actor.mu", "tanh", "ReLU"),
+    Actor("actor.mu", "", "tanh", "ReLU"),
+    Actor("q_net.q_net", "", "linear", "ReLU"),
+)
 #: Wrappers that change observations.
 REFUSED = ("VecFrameStack", "VecTransposeImage", "VecExtractDictObs")
 
@@ -45,9 +47,10 @@ REFUSED = ("VecFrameStack", "VecTransposeImage", "VecExtractDictObs")
 def sb3_fields(agent: Any, env: Any = None) -> dict[str, Any]:
     """Fields of `LearnedPolicy` from an agent and its environment.
 
-    `agent`: PPO, A2C, SAC, TD3, DDPG or TQC with "MlpPolicy"; `env`: the environment
-    that it learned in, with its wrappers; by default the agent's own. Raises InputError
-    for an agent or a wrapper that cannot be written as a learned policy.
+    `agent`: PPO, A2C, SAC, TD3, DDPG, TQC or DQN with "MlpPolicy"; `env`: the
+    environment that it learned in, with its wrappers; by default the agent's own.
+    Raises InputError for an agent or a wrapper that cannot be written as a learned
+    policy.
     """
     outermost = agent.get_env() if env is None else env
     if outermost is None:
@@ -98,26 +101,16 @@ def _check_wrapper(wrapper: Any) -> None:
 
 def _residual(stack: Sequence[Any]) -> dict[str, Any]:
     """Base and other settings of the wrapper that adds to a controller, if any."""
-    # Attributes of the wrapper that adds to a controller, and their types.
-    residual = {
-        "authority": float,
-        "frame_stack": int,
-        "action_repeat": int,
-        "rate_limit": float,
-    }
+    names = ("authority", "action_repeat", "rate_limit")
     for wrapper in stack:
-        if not vars(wrapper).keys() >= {"base", *residual}:
+        if not vars(wrapper).keys() >= {"base", *names}:
             continue
-        base = wrapper.base
-        if base is not None and not isinstance(base, Controller):
+        if not isinstance(wrapper.base, Controller):
             raise InputError(
                 "base: expected a controller of shipgym, which a file can hold, got"
-                f" {type(base).__name__}"
+                f" {type(wrapper.base).__name__}"
             )
-        settings = {
-            name: kind(getattr(wrapper, name)) for name, kind in residual.items()
-        }
-        return {"base": base, **settings}
+        return {name: getattr(wrapper, name) for name in ("base", *names)}
     return {}
 
 
@@ -127,8 +120,7 @@ def _paced(pace: Pace, action: str) -> dict[str, Any]:
     if pace.frame_stack > 1 and pace.action_repeat > 1:
         raise InputError(
             "env: a learned policy stacks the observations of control intervals:"
-            f" expected frame_stack or action_repeat, got both, {pace}; learn among the"
-            " ships of ResidualVecEnv, which takes both"
+            f" expected frame_stack or action_repeat, got both, {pace}"
         )
     if limit is not None and "shaft" in action:
         raise InputError(
@@ -197,52 +189,24 @@ def task_showing(names: Sequence[str]) -> str:
 def _network(agent: Any) -> Network:
     """Layers from observation to command."""
     policy = agent.policy
-    weights = policy.state_dict()
-    actors = (
-        Actor("mlp_extractor.policy_net", "action_net", "linear", "Tanh"),  # PPO, A2C
-        Actor("actor.latent_pi", "actor.mu", "tanh", "ReLU"),  # SAC, TQC
-        Actor("actor.mu", "", "tanh", "ReLU"),  # TD3, DDPG
-    )
-    known = [actor for actor in actors if actor.first_weight in weights]
-    if not known:
+    modules = dict(policy.named_modules())
+    actor = next((one for one in ACTORS if one.body in modules), None)
+    if actor is None:
         raise InputError(
-            "agent: expected PPO, A2C, SAC, TD3, DDPG or TQC with 'MlpPolicy', got"
+            "agent: expected PPO, A2C, SAC, TD3, DDPG, TQC or DQN with 'MlpPolicy', got"
             f" {type(agent).__name__} with {type(policy).__name__}"
         )
-    actor = known[0]
     activation = getattr(policy, "activation_fn", None)
     between = getattr(activation, "__name__", actor.activation)
-    activation_of = {"ReLU": "relu", "Tanh": "tanh"}
-    if between not in activation_of:
+    if between not in ("ReLU", "Tanh"):
         raise InputError(
             f"agent: expected ReLU or Tanh between its layers, got {between}"
         )
-    layers = _dense_layers(actor, weights)
-    return Network(layers, activation_of[between], actor.output)
-
-
-def _dense_layers(actor: Actor, weights: Mapping[str, Any]) -> tuple[Layer, ...]:
-    """Layers from observation to command."""
-    names = _names_of_layers(actor, weights)
-    layers = []
-    for name in names:
-        weight = _array(weights[f"{name}.weight"])
-        bias = _array(weights[f"{name}.bias"])
-        layers.append(Layer(weight, bias))
-    return tuple(layers)
-
-
-def _names_of_layers(actor: Actor, weights: Mapping[str, Any]) -> list[str]:
-    """Names of the layers from observation to command, without activations."""
-    layers = []
-    for number in count(step=2):
-        layer = f"{actor.body}.{number}"
-        if f"{layer}.weight" not in weights:
-            break
-        layers.append(layer)
+    dense = [one for one in modules[actor.body].modules() if hasattr(one, "weight")]
     if actor.head:
-        layers.append(actor.head)
-    return layers
+        dense.append(modules[actor.head])
+    layers = tuple(Layer(_array(one.weight), _array(one.bias)) for one in dense)
+    return Network(layers, between.lower(), actor.output)
 
 
 def _array(parameter: Any) -> NDArray[np.float32]:
@@ -252,27 +216,18 @@ def _array(parameter: Any) -> NDArray[np.float32]:
 
 def _check_extraction(network: Network, agent: Any, action: str) -> None:
     """Refuse a network that differs from its agent at random observations."""
-    n_inputs, *_ = network.sizes
     shape = agent.observation_space.shape
-    if np.prod(shape) != n_inputs:
-        raise InputError(
-            f"agent: expected {n_inputs} observations, as its network has inputs, got"
-            f" those of shape {shape}"
-        )
-
     random = np.random.default_rng(0)
-    n_compared = 16
-    uniform = random.uniform(-1.0, 1.0, (n_compared, n_inputs))
-    inputs = uniform.astype(np.float32)
-    shown = inputs.reshape(n_compared, *shape)
+    shown = random.uniform(-1.0, 1.0, (16, *shape)).astype(np.float32)
     commands, _ = agent.predict(shown, deterministic=True)
-    output = network(inputs)
-    agreement = 1e-5  # of the commands found with torch and without, above rounding
-    if action == "rudder-discrete":
-        agrees = np.array_equal(output.argmax(axis=-1), commands)
-    else:
-        deviation = np.abs(np.clip(output, -1.0, 1.0) - commands)
-        agrees = bool(deviation.max() < agreement)
+    n_inputs, *_ = network.sizes
+    agrees = np.prod(shape) == n_inputs
+    if agrees:
+        output = network(shown.reshape(len(shown), -1))
+        if action == "rudder-discrete":
+            agrees = np.array_equal(output.argmax(axis=-1), commands)
+        else:
+            agrees = np.abs(np.clip(output, -1.0, 1.0) - commands).max() < 1e-5
     if not agrees:
         raise InputError(
             "agent: expected 'MlpPolicy' with actions in [-1, 1], got"

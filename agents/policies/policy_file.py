@@ -12,7 +12,7 @@ from agents.controllers.controller import FORMAT
 from agents.controllers.controller_file import read_controller, read_model, read_scales
 from agents.controllers.interface import check_names
 from agents.policies.network import Layer, Network
-from agents.policies.policy import LearnedPolicy
+from agents.policies.policy import PLAIN, LearnedPolicy
 from agents.policies.weights_file import (
     REMEDY,
     Tensors,
@@ -33,21 +33,8 @@ from shipgym.checks import (
 from shipgym.tasks.scales import OBSERVATION_NAMES
 
 FIELDS = (
-    "format",
-    "kind",
-    "observation_names",
-    "observation_scales",
-    "action",
-    "network",
-    "frame_stack",
-    "base",
-    "authority",
-    "action_repeat",
-    "rate_limit",
-    "environment",
-    "model",
-    "training",
-    "weights",
+    *("format", "kind", *PLAIN, "network", "base"),
+    *("environment", "model", "training", "weights"),
 )
 
 
@@ -83,20 +70,17 @@ def _learned(content: Mapping[str, Any], tensors: Tensors) -> LearnedPolicy:
     if content["base"] is not None:
         base = read_controller(check_table(content["base"], "base"), "base")
 
+    fields: dict[str, Any] = read_model(content["model"])
+    fields |= {name: content[name] for name in PLAIN}
+    fields["observation_names"] = names
+    fields["observation_scales"] = read_scales(content["observation_scales"], names)
     return LearnedPolicy(
         network=_network(content["network"], tensors),
-        observation_names=names,
-        observation_scales=read_scales(content["observation_scales"], names),
-        action=content["action"],
-        frame_stack=content["frame_stack"],
+        **fields,
         base=base,
-        authority=content["authority"],
-        action_repeat=content["action_repeat"],
-        rate_limit=content["rate_limit"],
         env_id=check_text(environment.get("id"), "environment.id"),
         env_options=dict(options),
         training=dict(check_table(content["training"], "training")),
-        **read_model(content["model"]),
     )
 
 

@@ -1,13 +1,12 @@
-"""Agents of stable-baselines3 and sb3-contrib, and the ships that they learn from."""
+"""Agents of stable-baselines3, and the ships that they learn from."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from stable_baselines3 import PPO, SAC, TD3
-from stable_baselines3.common.noise import NormalActionNoise
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from agents.agent_file import load_agent
@@ -16,18 +15,12 @@ from agents.controllers.designs import design, tuned
 from agents.suites.suite import BenchmarkTask
 from agents.training.plan import TrainingPlan, training_options
 from agents.training.residual import ResidualVecEnv
-from agents.training.settings import (
-    LearningSettings,
-    OffPolicySettings,
-    PPOSettings,
-    SACSettings,
-    TD3Settings,
-    TQCSettings,
-)
+from agents.training.settings import LearningSettings, PPOSettings, SACSettings
 from shipgym.envs.pace import NO_LIMIT
 from shipgym.envs.sb3 import ShipVecEnv
 from shipgym.errors import InputError
-from shipgym.extras import library
+
+ALGORITHMS = {"ppo": PPO, "sac": SAC}
 
 
 class StaggeredShips(ShipVecEnv):
@@ -50,28 +43,21 @@ class StaggeredShips(ShipVecEnv):
 def make_ships(plan: TrainingPlan, base: Controller | None) -> VecEnv:
     """Make the ships that a plan's agent learns from, as it sees and steers them."""
     settings = plan.settings
+    options = training_options(plan)
+    pace: dict[str, Any] = {"action_repeat": settings.action_repeat}
+    if settings.rate_limit < NO_LIMIT:
+        pace["rate_limit"] = settings.rate_limit
+    if base is None:
+        options |= {"frame_stack": settings.frame_stack, **pace}
     ships: VecEnv = StaggeredShips(
         plan.task.env_id,
         settings.ships,
         model=plan.task.ship,
         threads=plan.threads,
-        **training_options(plan),
+        **options,
     )
-    wrapped = (
-        base is not None
-        or settings.frame_stack != 1
-        or settings.action_repeat != 1
-        or settings.rate_limit != NO_LIMIT
-    )
-    if wrapped:
-        ships = ResidualVecEnv(
-            ships,
-            base,
-            authority=settings.authority,
-            frame_stack=settings.frame_stack,
-            action_repeat=settings.action_repeat,
-            rate_limit=settings.rate_limit,
-        )
+    if base is not None:
+        ships = ResidualVecEnv(ships, base, authority=settings.authority, **pace)
     return scaled_rewards(ships, settings)
 
 
@@ -92,16 +78,13 @@ def make_agent(plan: TrainingPlan, base: Controller | None) -> Any:
     `base` is the controller that it adds to. The agent's seed is also that of the
     ships; the random numbers start again.
     """
-    settings = plan.settings
-    ships = make_ships(plan, base)
-    algorithm = algorithm_class(plan.algorithm)
-    agent = algorithm(
+    agent = ALGORITHMS[plan.algorithm](
         "MlpPolicy",
-        ships,
+        make_ships(plan, base),
         seed=plan.training_seed,
-        **sb3_arguments(settings, ships.action_space.shape),
+        **sb3_arguments(plan.settings),
     )
-    if base is not None and isinstance(settings, OffPolicySettings):
+    if base is not None and plan.algorithm == "sac":
         begin_as_base(agent)
     return agent
 
@@ -139,84 +122,43 @@ def design_base(name: str, task: BenchmarkTask) -> Controller | None:
     return design(name, task)
 
 
-def begin_as_base(agent: Any) -> None:
+def begin_as_base(agent: SAC) -> None:
     """Make the last layer of a policy zero, which then adds nothing to its base.
 
     Source: Silver et al. 2018, arXiv:1812.06298. PPO's last layer is next to zero
     anyway.
     """
-    actors = [agent.actor]
-    if hasattr(agent, "actor_target"):  # SAC and TQC have none
-        actors.append(agent.actor_target)
-    for actor in actors:
-        for layer in actor.mu.modules():
-            if isinstance(layer, torch.nn.Linear):
-                last = layer
-        torch.nn.init.zeros_(last.weight)
-        torch.nn.init.zeros_(last.bias)
+    torch.nn.init.zeros_(agent.actor.mu.weight)
+    torch.nn.init.zeros_(agent.actor.mu.bias)
 
 
-def sb3_arguments(
-    settings: LearningSettings, action_shape: tuple[int, ...] = (1,)
-) -> dict[str, Any]:
-    """Keywords of the algorithm's class in stable-baselines3 or sb3-contrib.
-
-    `action_shape` is that of one ship's actions.
-    """
-    names = ["batch_size", "gamma"]
-    renamed: dict[str, Any] = {}
-    if isinstance(settings, PPOSettings):
-        names += ["n_steps", "n_epochs", "gae_lambda", "clip_range", "ent_coef"]
-    if isinstance(settings, OffPolicySettings):
-        names += ["buffer_size", "learning_starts", "train_freq", "gradient_steps"]
-        names += ["tau"]
-    if isinstance(settings, SACSettings):
-        names += ["ent_coef", "target_entropy"]
-    if isinstance(settings, TD3Settings):
-        names += ["policy_delay", "target_policy_noise", "target_noise_clip"]
-        deviation = np.full(action_shape, settings.action_noise)
-        noise = NormalActionNoise(np.zeros(action_shape), deviation)
-        renamed["action_noise"] = noise
-    if isinstance(settings, TQCSettings):
-        renamed["top_quantiles_to_drop_per_net"] = settings.top_quantiles_to_drop
-    return {
-        **{name: getattr(settings, name) for name in names},
-        **renamed,
-        "learning_rate": _rate(settings),
-        "policy_kwargs": _network(settings),
-        "device": "cpu",
-    }
-
-
-def _network(settings: LearningSettings) -> dict[str, Any]:
-    """Keywords of the policy's class."""
-    activations = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
+def sb3_arguments(settings: LearningSettings) -> dict[str, Any]:
+    """Keywords of the algorithm's class in stable-baselines3."""
+    names = ["batch_size", "gamma", "ent_coef"]
     network: dict[str, Any] = {
         "net_arch": list(settings.net_arch),
-        "activation_fn": activations[settings.activation],
+        "activation_fn": {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}[
+            settings.activation
+        ],
         # half of the time of small networks is Adam's otherwise
         "optimizer_kwargs": {"fused": True},
     }
     if isinstance(settings, PPOSettings):
+        names += ["n_steps", "n_epochs", "gae_lambda", "clip_range"]
         network["log_std_init"] = settings.log_std_init
-    if isinstance(settings, OffPolicySettings):
+    if isinstance(settings, SACSettings):
+        names += ["buffer_size", "learning_starts", "train_freq", "gradient_steps"]
+        names += ["tau", "target_entropy"]
         network["net_arch"] = {
             "pi": list(settings.net_arch),
             "qf": list(settings.critic_arch),
         }
-    if isinstance(settings, TQCSettings):
-        network["n_quantiles"] = settings.n_quantiles
-    return network
-
-
-def _rate(settings: LearningSettings) -> Callable[[float], float]:
-    """Learning rate by the part of the training that is left."""
-
-    def falling(left: float) -> float:
-        # the last rollout ends after the last step
-        return settings.learning_rate * max(left, 0.0)
-
-    return falling
+    return {
+        **{name: getattr(settings, name) for name in names},
+        "learning_rate": LinearSchedule(settings.learning_rate, 0.0, 1.0),
+        "policy_kwargs": network,
+        "device": "cpu",
+    }
 
 
 def set_deviation(agent: Any, settings: LearningSettings) -> None:
@@ -229,10 +171,3 @@ def set_deviation(agent: Any, settings: LearningSettings) -> None:
         end = float(settings.log_std_end)
         log_std = begin + done * (end - begin)
         agent.policy.log_std.data.fill_(log_std)
-
-
-def algorithm_class(name: str) -> Any:
-    """Class of an algorithm by its name; InputError if its package is not installed."""
-    if name == "tqc":
-        return library("sb3_contrib", "rl", "tqc needs it").TQC
-    return {"ppo": PPO, "sac": SAC, "td3": TD3}[name]

@@ -22,17 +22,11 @@ class HeldOut:
     """
 
     def __init__(
-        self,
-        task: BenchmarkTask,
-        first: int,
-        number: int,
-        threads: int = 1,
-        compared: Mapping[str, Policy] | None = None,
+        self, task: BenchmarkTask, first: int, number: int, threads: int = 1
     ) -> None:
         self.engine = task.engine(number, threads=threads)
         self.seeds = first + np.arange(number)
-        policies = {**yardsticks(task), **(compared or {})}
-        self.costs = {name: self.cost(one) for name, one in policies.items()}
+        self.costs = {name: self.cost(one) for name, one in yardsticks(task).items()}
 
     def cost(self, policy: Policy) -> float:
         """Mean cost of a policy."""
@@ -62,48 +56,20 @@ class TrainingResult:
     #: evaluations: steps, seconds, cost on the episodes held out, mean return of those
     #: learned from
     curve: tuple[Mapping[str, Any], ...]
-    # mean cost of the policy on the episodes held out, which it was chosen by
-    best_cost: float
-    #: when the policy was found, and when the training ended
-    best_steps: int
-    steps: int
     yardsticks: Mapping[str, float]  # mean costs on the same episodes, by name
-    seconds: float  # of training and evaluation, also before it was resumed
     resumed_from: int | None  # steps of the checkpoint that it went on from
 
     @property
-    def first_cost(self) -> float:
-        """Mean cost of the policy that has learned nothing yet."""
-        return float(self.curve[0]["cost"])
-
-    @property
-    def lq_cost(self) -> float | None:
-        """Mean cost of LQ on the same episodes, if the ship has one for the task."""
-        return self.yardsticks.get("LQ")
-
-    @property
-    def lq_reached(self) -> Mapping[str, Any] | None:
-        """First evaluation that cost no more than LQ, to a thousandth, if any.
-
-        A network that has learned nothing yet adds nearly nothing to its base.
-        """
-        if self.lq_cost is None:
-            return None
-        reached = 1.001 * self.lq_cost
-        return next((one for one in self.curve if one["cost"] <= reached), None)
+    def best(self) -> Mapping[str, Any]:
+        """Evaluation of the policy, which was chosen by it."""
+        return min(self.curve, key=lambda one: float(one["cost"]))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result for programs."""
         return {
             "configuration": self.plan.configuration(),
-            "steps": self.steps,
             "resumed_from": self.resumed_from,
-            "seconds": self.seconds,
-            "first_cost": self.first_cost,
-            "best_cost": self.best_cost,
-            "best_steps": self.best_steps,
+            "best": dict(self.best),
             "yardsticks": dict(self.yardsticks),
-            "lq_cost": self.lq_cost,
-            "lq_reached": self.lq_reached,
             "curve": list(self.curve),
         }

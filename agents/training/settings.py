@@ -6,9 +6,8 @@ tasks other than course keeping and path following; those with a base in an envi
 (`residual`), on every task of a suite (`suites`), on one of them (`tasks`).
 """
 
-from abc import abstractmethod
 from collections.abc import Collection, Mapping
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import dataclass, fields
 from math import gcd
 from pathlib import Path
 from typing import Any
@@ -18,9 +17,7 @@ from agents.settings import Settings, setting
 from agents.suites.environments import SHORT_NAMES
 from shipgym.checks import check_choice, check_keys, check_table, check_text
 from shipgym.errors import InputError
-from shipgym.extras import library
 from shipgym.files import read_toml, shipped_toml
-from shipgym.tasks.task import ACTIONS
 
 #: Seeds of training for each `seed` of a plan.
 SEEDS_EACH = 1000
@@ -50,7 +47,10 @@ class LearningSettings(Settings):
         search=["relu", "tanh"],
     )
     frame_stack: int = setting(
-        "observations that the policy sees, the newest last", 1, at_least=1
+        "observations that the policy sees, the newest last; 1 with a base, or with"
+        " action_repeat",
+        1,
+        at_least=1,
     )
     action_repeat: int = setting(
         "control intervals of a decision; a base goes on with its feedback in each of"
@@ -80,12 +80,12 @@ class LearningSettings(Settings):
         above=0.0,
         at_most=2.0,
     )
-    model_uncertainty: str = setting(
-        "covariance: the ships that learn are drawn from the model's covariance;"
-        " evaluation is on the model itself. Unlike `--randomise` it leaves seas and"
-        " speeds as the task has them",
+    randomise: str = setting(
+        "covariance: the ships that learn are drawn from the model's covariance; all:"
+        " approach speeds and sea states are drawn too. Evaluation is on the task as it"
+        " is",
         "none",
-        options=("none", "covariance"),
+        options=("none", "covariance", "all"),
     )
 
     ships: int = setting("ships that sail at once", at_least=1, at_most=SEEDS_EACH)
@@ -129,21 +129,11 @@ class LearningSettings(Settings):
             raise InputError(
                 f"authority: expected 1 without a base, got {self.authority:g}"
             )
-        self._check_together()
-
-    @abstractmethod
-    def _check_together(self) -> None:
-        """Refuse settings that do not fit each other."""
-
-    @property
-    @abstractmethod
-    def rollout(self) -> int:
-        """Decisions of all ships between two updates; a training has whole rollouts."""
-
-    @property
-    def all_decisions(self) -> int:
-        """Decisions of a training: `total_steps`, rounded up to whole rollouts."""
-        return -(-self.total_steps // self.rollout) * self.rollout
+        if self.frame_stack > 1 and (self.base != "none" or self.action_repeat > 1):
+            raise InputError(
+                "frame_stack: expected 1 with a base or with action_repeat, got"
+                f" {self.frame_stack}"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,22 +182,19 @@ class PPOSettings(LearningSettings):
         word="learned",
     )
 
-    @property
-    def rollout(self) -> int:
-        """Decisions of all ships between two updates."""
-        return self.ships * self.n_steps
-
-    def _check_together(self) -> None:
-        if self.rollout % self.batch_size or self.batch_size < 2:
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        rollout = self.ships * self.n_steps
+        if rollout % self.batch_size or self.batch_size < 2:
             raise InputError(
                 "batch_size: expected a divisor above 1 of ships x n_steps ="
-                f" {self.rollout}, got {self.batch_size}"
+                f" {rollout}, got {self.batch_size}"
             )
 
 
 @dataclass(frozen=True, kw_only=True)
-class OffPolicySettings(LearningSettings):
-    """Settings of the algorithms that learn from a replay buffer."""
+class SACSettings(LearningSettings):
+    """Soft actor-critic (Haarnoja et al. 2018, arXiv:1812.05905)."""
 
     buffer_size: int = setting("decisions that are remembered", 200_000, at_least=1)
     learning_starts: int = setting(
@@ -233,23 +220,6 @@ class OffPolicySettings(LearningSettings):
         search=[(64, 64), (128, 128), (256, 256)],
     )
 
-    @property
-    def rollout(self) -> int:
-        """Decisions of all ships between two updates."""
-        return self.ships * self.train_freq
-
-    def _check_together(self) -> None:
-        if self.buffer_size < self.ships:
-            raise InputError(
-                f"buffer_size: expected at least {self.ships}, one for each of the"
-                f" ships, got {self.buffer_size}"
-            )
-
-
-@dataclass(frozen=True, kw_only=True)
-class SACSettings(OffPolicySettings):
-    """Soft actor-critic (Haarnoja et al. 2018, arXiv:1812.05905)."""
-
     ent_coef: float | str = setting(
         "weight of the entropy; auto or auto_0.1 adapts it, from that value",
         "auto_0.1",
@@ -266,46 +236,12 @@ class SACSettings(OffPolicySettings):
         search=(-3.0, 0.5),
     )
 
-
-@dataclass(frozen=True, kw_only=True)
-class TD3Settings(OffPolicySettings):
-    """Twin delayed DDPG (Fujimoto et al. 2018, arXiv:1802.09477)."""
-
-    action_noise: float = setting(
-        "standard deviation of what is added to actions to explore",
-        0.1,
-        above=0.0,
-        search=(0.03, 0.5, "log"),
-    )
-    policy_delay: int = setting(
-        "updates of the critics for one of the policy", 2, at_least=1, search=(1, 8)
-    )
-    target_policy_noise: float = setting(
-        "standard deviation of what is added to the target's actions", 0.2, at_least=0.0
-    )
-    target_noise_clip: float = setting(
-        "largest noise added to the target's actions", 0.5, at_least=0.0
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class TQCSettings(SACSettings):
-    """Truncated quantile critics (Kuznetsov et al. 2020, arXiv:2005.04269)."""
-
-    n_quantiles: int = setting("quantiles of each critic", 25, at_least=1)
-    top_quantiles_to_drop: int = setting(
-        "quantiles of each critic that are dropped, the largest",
-        2,
-        at_least=0,
-        search=(0, 5),
-    )
-
-    def _check_together(self) -> None:
-        super()._check_together()
-        if self.top_quantiles_to_drop >= self.n_quantiles:
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.buffer_size < self.ships:
             raise InputError(
-                f"top_quantiles_to_drop: expected fewer than n_quantiles ="
-                f" {self.n_quantiles}, got {self.top_quantiles_to_drop}"
+                f"buffer_size: expected at least {self.ships}, one for each of the"
+                f" ships, got {self.buffer_size}"
             )
 
 
@@ -313,8 +249,6 @@ class TQCSettings(SACSettings):
 ALGORITHMS: Mapping[str, type[LearningSettings]] = {
     "ppo": PPOSettings,
     "sac": SACSettings,
-    "td3": TD3Settings,
-    "tqc": TQCSettings,
 }
 
 
@@ -322,9 +256,8 @@ def load_settings(
     algorithm: str,
     environment: str = "course-keeping",
     task: str = "",
-    given: Mapping[str, Any] | None = None,
-    action: str = "rudder",
     suite: str = "",
+    given: Mapping[str, Any] | None = None,
 ) -> LearningSettings:
     """Return the tuned settings of an algorithm, with those given by name replaced.
 
@@ -334,7 +267,7 @@ def load_settings(
 
     Parameters
     ----------
-    algorithm : {"ppo", "sac", "td3", "tqc"}
+    algorithm : {"ppo", "sac"}
     environment : str
         "course-keeping", "path-following", "encounter", or the path of a task's file.
     task : str
@@ -343,46 +276,34 @@ def load_settings(
     suite : str
         Its suite (`BenchmarkTask.suite`).
     given : mapping of str to Any, optional
-        LearningSettings by name that go before the tuned ones.
-    action : {"rudder", "rudder-discrete", "rudder-shaft"}
-        What is commanded. With others than the rudder, or `base` given as "none", a
+        Settings by name that go before the tuned ones. With `base` given as "none" a
         policy learns from scratch.
     """
-    check_choice(algorithm, ALGORITHMS, "algorithm")
+    kind = settings_of(algorithm)
     if not environment.endswith(".py"):
         check_choice(environment, SHORT_NAMES, "environment")
-    check_choice(action, ACTIONS, "action")
     given = given or {}
     tables = shipped_toml("agents.training", f"hyperparameters/{algorithm}.toml")
-    values = dict(tables["defaults"])
     residual = tables["residual"]
-    if environment not in residual and given.get("base", "none") == "none":
-        values |= tables["own"]
-    has_base = action == "rudder" and given.get("base") != "none"
+    has_base = (
+        given.get("base", "none" if environment not in residual else "") != "none"
+    )
+    layers = [tables["defaults"]]
     if has_base:
-        values |= residual.get(environment, {})
-    if has_base and suite in tables["suites"]:
-        values |= tables["suites"][suite]
-        tasks = tables.get("tasks", {})
-        values |= tasks.get(task, {})
-    return make_settings(algorithm, {**values, **given})
+        layers += [residual.get(environment, {}), tables["suites"].get(suite, {})]
+        layers += [tables["tasks"].get(task, {})] if suite else []
+    elif environment not in residual:
+        layers.append(tables["own"])
+    values: dict[str, Any] = {}
+    for layer in (*layers, given):
+        values |= layer
+    check_keys(values, [one.name for one in fields(kind)], f"settings of {algorithm}")
+    return kind(**values)
 
 
 def settings_of(algorithm: str) -> type[LearningSettings]:
     """Class of an algorithm's settings; InputError for an unknown algorithm."""
     return ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
-
-
-def make_settings(algorithm: str, values: Mapping[str, Any]) -> LearningSettings:
-    """Make settings of values by name; those that have a default may be left out.
-
-    Raises InputError for one unknown or missing, or a value out of its range.
-    """
-    kind = settings_of(algorithm)
-    names = [one.name for one in fields(kind)]
-    needed = [one.name for one in fields(kind) if one.default is MISSING]
-    check_keys(values, names, f"settings of {algorithm}", needed)
-    return kind(**values)
 
 
 def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
@@ -392,45 +313,26 @@ def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
     return dict(table)
 
 
-def search_space(algorithm: str, fixed: Collection[str] = ()) -> dict[str, Any]:
-    """Return Optuna's distributions by setting, without those that are fixed.
+def suggested(
+    settings: LearningSettings, trial: Any, fixed: Collection[str] = ()
+) -> LearningSettings:
+    """Return settings with the values that an Optuna trial suggests for the others.
 
-    They are drawn in this order.
+    A batch that does not divide PPO's rollout is made to.
     """
-    optuna = library("optuna.distributions", "tune", "tuning needs it")
-    space: dict[str, Any] = {}
-    for one in fields(settings_of(algorithm)):
-        search = one.metadata["search"]
-        if search is None or one.name in fixed:
+    varied: dict[str, Any] = {}
+    for one in fields(settings):
+        name, search = one.name, one.metadata["search"]
+        if search is None or name in fixed:
             continue
         if isinstance(search, list):
-            choices = [
-                str(value) if isinstance(value, tuple) else value for value in search
-            ]
-            space[one.name] = optuna.CategoricalDistribution(choices)
+            choices = {str(value): value for value in search}
+            varied[name] = choices[trial.suggest_categorical(name, [*choices])]
         elif one.type is int:
-            space[one.name] = optuna.IntDistribution(*search)
+            varied[name] = trial.suggest_int(name, *search)
         else:
-            low, high = search[:2]
-            log = len(search) > 2
-            space[one.name] = optuna.FloatDistribution(low, high, log=log)
-    return space
-
-
-def with_parameters(
-    settings: LearningSettings, parameters: Mapping[str, Any]
-) -> LearningSettings:
-    """Return the settings that Optuna's parameters stand for.
-
-    A batch that does not divide PPO's rollout is made to. Raises InputError if they
-    conflict with those that are not varied.
-    """
-    varied = dict(parameters)
-    for one in fields(settings):
-        search = one.metadata["search"]
-        if one.name in varied and isinstance(search, list):
-            values = {str(value): value for value in search}
-            varied[one.name] = values[str(varied[one.name])]
+            low, high, *scale = search
+            varied[name] = trial.suggest_float(name, low, high, log=bool(scale))
     if isinstance(settings, PPOSettings) and "batch_size" in varied:
         rollout = settings.ships * varied.get("n_steps", settings.n_steps)
         varied["batch_size"] = gcd(varied["batch_size"], rollout)

@@ -2,14 +2,14 @@
 
 stable-baselines3 learns. A run can be killed at any moment and goes on from the last
 save: networks, optimisers, scale of the rewards and replay buffer; its ships begin new
-episodes. What is saved is tensors and JSON, which torch reads without running code.
+episodes. What is saved is tensors and numbers, which torch reads without running code.
 """
 
-import json
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -17,14 +17,13 @@ from typing import Any
 import numpy as np
 
 from agents.agent_file import load_agent
-from agents.controllers.interface import Policy
 from agents.output import in_use
 from agents.policies.policy import LearnedPolicy
 from agents.training import run_folder
 from agents.training.evaluation import HeldOut, TrainingProgress, TrainingResult
 from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS, TrainingPlan
 from shipgym.errors import InputError
-from shipgym.files import read_bytes, write_bytes, write_json
+from shipgym.files import write_bytes, write_json
 
 try:
     import torch
@@ -39,7 +38,6 @@ except ModuleNotFoundError as error:
         f"{error.name} is not installed, training needs it: pip install 'shipgym[rl]'"
     ) from None
 
-LARGEST_CHECKPOINT = 2_000_000_000  # bytes
 #: Arrays of a replay buffer.
 REPLAY = (
     "observations",
@@ -57,8 +55,7 @@ def train(
     *,
     resume: bool = False,
     on_progress: Callable[[TrainingProgress], None] | None = None,
-    command: str | None = None,
-    compared: Mapping[str, Policy] | None = None,
+    command: str = "train()",
     evaluation_episodes: int = N_EVALUATIONS,
     save_seconds: float = 45.0,
 ) -> TrainingResult:
@@ -79,36 +76,29 @@ def train(
     on_progress : callable, optional
         Called with the progress before each rollout. An exception of it ends the
         training.
-    command : str, optional
+    command : str
         Command line that is written into the run's folder.
-    compared : mapping of str to Policy, optional
-        Further yardsticks by name, beside those of `yardsticks`.
     evaluation_episodes : int
         Episodes held out, on which the policy is chosen.
     save_seconds : float
         Least time between saves.
     """
-    if resume and out is None:
-        raise InputError("resume: expected the folder of the run, got none")
-    folder = None if out is None else Path(out)
     with ExitStack() as stack:
-        if folder is not None:
+        folder = None
+        if out is not None:
+            folder = Path(out)
             stack.enter_context(in_use(folder))
             if resume:
                 run_folder.check_resumable(folder, plan)
             else:
                 run_folder.check_new(folder)
         stack.enter_context(_torch_threads(plan.threads))
-        held_out = HeldOut(
-            plan.task, EVALUATION_SEED, evaluation_episodes, plan.threads, compared
-        )
-        run = _Run(plan, folder, held_out, save_seconds)
+        run = _Run(plan, folder, evaluation_episodes, save_seconds)
         run.on_progress = on_progress
         if folder is not None and resume:
             run.restore(folder / run_folder.CHECKPOINT)
         elif folder is not None:
-            words = command or f"train({plan.algorithm!r})"
-            run_folder.begin_folder(folder, plan, words)
+            run_folder.begin_folder(folder, plan, command)
         return run.learn()
 
 
@@ -121,7 +111,7 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
         self,
         plan: TrainingPlan,
         folder: Path | None,
-        held_out: HeldOut,
+        episodes: int,
         save_seconds: float,
     ) -> None:
         super().__init__()
@@ -129,11 +119,14 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
         self.plan = plan
         self.folder = folder
         self.save_seconds = save_seconds
-        self.held_out = held_out
+        self.held_out = HeldOut(plan.task, EVALUATION_SEED, episodes, plan.threads)
         self.agent = make_agent(plan, design_base(plan.settings.base, plan.task))
-        self.policy: LearnedPolicy | None = None
+        log = []
+        if folder is not None and find_spec("tensorboard"):
+            log.append(TensorBoardOutputFormat(str(folder / run_folder.TENSORBOARD)))
+        self.agent.set_logger(Logger(None, log))
+        self.policy: Any = None
         self.curve: list[dict[str, Any]] = []
-        self.seconds_before = 0.0
         self.saved_at = -np.inf
         self.resumed_from: int | None = None
 
@@ -145,16 +138,15 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
     @property
     def seconds(self) -> float:
         """Time spent so far, also before the run was resumed."""
-        return self.seconds_before + time.monotonic() - self.started
+        return time.monotonic() - self.started
 
     @property
-    def best(self) -> dict[str, Any]:
-        """Evaluation of the lowest cost, the first of them."""
-        return min(self.curve, key=lambda one: float(one["cost"]))
+    def best_cost(self) -> float:
+        """Lowest cost of an evaluation."""
+        return min(float(one["cost"]) for one in self.curve)
 
     def learn(self) -> TrainingResult:
         """Learn to the end."""
-        self.agent.set_logger(_log(self.folder))
         left = self.plan.settings.total_steps - self.steps
         try:
             if left > 0:
@@ -169,23 +161,15 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
             raise self._diverged() from error
         finally:
             self.agent.logger.close()
-        return self._result()
-
-    def _result(self) -> TrainingResult:
-        policy: Any = self.policy
-        if policy is None and self.folder is not None:
+        if self.policy is None and self.folder is not None:
             # found before the run was resumed
-            policy = load_agent(self.folder / run_folder.AGENT)
+            self.policy = load_agent(self.folder / run_folder.AGENT)
         return TrainingResult(
             self.plan,
-            policy,
-            curve=tuple(self.curve),
-            best_cost=self.best["cost"],
-            best_steps=self.best["steps"],
-            steps=self.steps,
-            yardsticks=self.held_out.costs,
-            seconds=self.seconds,
-            resumed_from=self.resumed_from,
+            self.policy,
+            tuple(self.curve),
+            self.held_out.costs,
+            self.resumed_from,
         )
 
     def _on_step(self) -> bool:
@@ -199,21 +183,19 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
         if is_due:
             self.evaluate()
         if self.on_progress is not None:
-            self.on_progress(self._progress(is_due))
+            progress = TrainingProgress(
+                steps=self.steps,
+                total=self.plan.settings.total_steps,
+                seconds=self.seconds,
+                cost=self.curve[-1]["cost"],
+                best_cost=self.best_cost,
+                yardsticks=self.held_out.costs,
+                evaluated=is_due,
+            )
+            self.on_progress(progress)
         if time.monotonic() - self.saved_at >= self.save_seconds:
             self.save()
         set_deviation(self.agent, self.plan.settings)
-
-    def _progress(self, evaluated: bool) -> TrainingProgress:
-        return TrainingProgress(
-            steps=self.steps,
-            total=self.plan.settings.all_decisions,
-            seconds=self.seconds,
-            cost=self.curve[-1]["cost"],
-            best_cost=self.best["cost"],
-            yardsticks=self.held_out.costs,
-            evaluated=evaluated,
-        )
 
     def evaluate(self) -> None:
         """Run the held-out episodes; keep the policy if it is the best."""
@@ -222,7 +204,8 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
                 raise self._diverged()
         policy = LearnedPolicy.from_sb3(self.agent)
         cost = self.held_out.cost(policy)
-        returns = [episode["r"] for episode in self.agent.ep_info_buffer or ()]
+        returns = [float(one["r"]) for one in self.agent.ep_info_buffer or ()]
+        is_best = not self.curve or cost < self.best_cost
         self.curve.append(
             {
                 "steps": self.steps,
@@ -232,9 +215,7 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
             }
         )
         self.agent.logger.record("evaluation/cost", cost)
-
         policy = replace(policy, training=self._record())
-        is_best = self.best is self.curve[-1]
         if is_best:
             self.policy = policy
         if self.folder is not None:
@@ -272,13 +253,14 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
             return
         agent = self.agent
         _, names = agent._get_torch_save_params()
-        rewards = agent.get_env().ret_rms
+        rewards = vars(agent.get_env().ret_rms)
         content = {
-            "run": json.dumps({"curve": self.curve, "seconds": self.seconds}),
+            "curve": self.curve,
+            "seconds": self.seconds,
             "counters": [self.steps, agent._n_updates],
             "parameters": agent.get_parameters(),
             "variables": {name: recursive_getattr(agent, name) for name in names},
-            "rewards": [float(rewards.mean), float(rewards.var), float(rewards.count)],
+            "rewards": {name: float(value) for name, value in rewards.items()},
             "replay": _replay(agent),
         }
         file = BytesIO()
@@ -287,23 +269,19 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
 
     def restore(self, checkpoint: Path) -> None:
         """Resume from the last save; a run killed before its first one starts again."""
-        self.resumed_from = 0
-        if not checkpoint.exists():
-            return
-        file = BytesIO(read_bytes(checkpoint, "checkpoint", LARGEST_CHECKPOINT))
-        try:
-            content = torch.load(file, map_location="cpu", weights_only=True)
-            run = json.loads(content["run"])
-            self.seconds_before = float(run["seconds"])
-            self.curve = [dict(one) for one in run["curve"]]
-            _restore(self.agent, content)
-        except Exception as error:  # of torch and its unpickler, of any kind
-            first_line, _, _ = str(error).partition("\n")
-            raise InputError(
-                f"{checkpoint}: cut short, or it does not fit this run"
-                f" ({first_line.rstrip(' :')}); start a new run"
-            ) from None
-        set_random_seed(self.plan.training_seed + self.steps)
+        if checkpoint.exists():
+            try:
+                content = torch.load(checkpoint, map_location="cpu", weights_only=True)
+                _restore(self.agent, content)
+                self.curve = content["curve"]
+                self.started -= content["seconds"]
+            except Exception as error:  # of torch and its unpickler, of any kind
+                first_line, _, _ = str(error).partition("\n")
+                raise InputError(
+                    f"{checkpoint}: cut short, or it does not fit this run"
+                    f" ({first_line.rstrip(' :')}); start a new run"
+                ) from None
+            set_random_seed(self.plan.training_seed + self.steps)
         self.resumed_from = self.steps
 
 
@@ -323,8 +301,8 @@ def _restore(agent: Any, content: dict[str, Any]) -> None:
     for name, value in content["variables"].items():
         recursive_getattr(agent, name).data.copy_(value)
     agent.num_timesteps, agent._n_updates = content["counters"]
-    rewards = agent.get_env().ret_rms
-    rewards.mean, rewards.var, rewards.count = map(np.float64, content["rewards"])
+    for name, value in content["rewards"].items():
+        setattr(agent.get_env().ret_rms, name, np.float64(value))
     replay = content["replay"]
     if replay is not None:
         buffer = agent.replay_buffer
@@ -343,13 +321,3 @@ def _torch_threads(number: int) -> Iterator[None]:
         yield
     finally:
         torch.set_num_threads(before)
-
-
-def _log(folder: Path | None) -> Logger:
-    """Log for TensorBoard, where there is a folder and TensorBoard is installed."""
-    formats: list[Any] = []
-    if folder is not None:
-        with suppress(ImportError, AssertionError):
-            log = TensorBoardOutputFormat(str(folder / run_folder.TENSORBOARD))
-            formats.append(log)
-    return Logger(None, formats)

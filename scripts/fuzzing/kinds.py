@@ -18,8 +18,6 @@ from rich.console import Console
 from agents import load_agent, load_results
 from agents.cli.benchmark_tables import costs_table, ranking_table
 from agents.suites.suite import parse_suite
-from agents.training.plan import TrainingPlan, make_plan, training_options
-from agents.training.run_folder import resumed
 from agents.training.settings import load_settings, read_settings_file
 from fuzzing.reading import Kind
 from shipgym import Episode, ShipFile, ShipModel, Trial
@@ -79,12 +77,6 @@ def use_episode(episode: Episode) -> None:
         episode.to_trial()
 
 
-def use_plan(plan: TrainingPlan) -> None:
-    """What it is written as, and the environment that is learned in."""
-    written(plan.configuration())
-    training_options(plan)
-
-
 def use_ship(trials: list[Trial]) -> None:
     """All channels are finite."""
     for trial in filter(None, trials):  # none where a decision is needed
@@ -92,11 +84,6 @@ def use_ship(trials: list[Trial]) -> None:
             np.isfinite(values).all() for values in (trial.t, *trial.channels.values())
         ):
             raise AssertionError(f"{trial.name}: not finite")
-
-
-def read_run(path: Path) -> TrainingPlan:
-    """The folder of a training."""
-    return make_plan(resumed(path.parent, {}))
 
 
 def read_suite(path: Path) -> Any:
@@ -126,7 +113,6 @@ KINDS = (
     Kind("policy", load_agent, use_agent, main="agent.json", slow=4),
     Kind("episode", Episode.load, use_episode),
     Kind("results", load_results, use_results, main="results.json", slow=8),
-    Kind("run", read_run, use_plan, main="run.json", slow=8),
     Kind("suite", read_suite, slow=2),
     Kind("settings", read_settings, slow=8),
 )

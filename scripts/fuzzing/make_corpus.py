@@ -24,8 +24,6 @@ from agents.controllers.registry import CLASSICAL, controller_class
 from agents.policies.network import Layer, Network
 from agents.policies.policy import LearnedPolicy
 from agents.suites.suite import FOLDER
-from agents.training.plan import TrainingRequest, make_plan
-from agents.training.run_folder import begin_folder
 from shipgym import Episode, Particulars, ShipFile, ShipModel
 from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
 
@@ -215,23 +213,6 @@ def results(folder: Path) -> None:
     made.save(folder / "results" / "two")
 
 
-def run(folder: Path) -> None:
-    """The file of a training."""
-    settings = {
-        "base": "none",
-        "ships": 2,
-        "n_steps": 8,
-        "batch_size": 8,
-        "n_epochs": 1,
-        "total_steps": 32,
-        "net_arch": [4],
-        "evaluate_every": 16,
-    }
-    options = {"episode_steps": 20, "change_interval_steps": 10, "sea": "slight"}
-    request = TrainingRequest("ppo", options=options, settings=settings)
-    begin_folder(folder / "run" / "ppo", make_plan(request), "train('ppo')")
-
-
 def texts(folder: Path) -> None:
     """Files of suites and of settings."""
     folder.joinpath("suite").mkdir()
@@ -261,7 +242,6 @@ MAKERS: tuple[Callable[[Path], None], ...] = (
     policies,
     episode,
     results,
-    run,
     texts,
 )
 SHIP: ShipModel = shipgym.load_model("mariner")

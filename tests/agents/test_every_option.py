@@ -33,7 +33,7 @@ WRONG = (
     "--structure abkowitz --reference-model mariner --kernel none-such --prior auto"
     " --prior-strength 1"
 )
-TASK = "--task calm --suite small.toml --allow-code reward.py"
+TASK = "--task rough-path"
 #: Sizes at which a rollout of learning takes a moment.
 SMALL = "--set ships=2 --set n_steps=16 --set batch_size=16 --set evaluate_every=32"
 TASK_OF_OWN = (
@@ -73,19 +73,15 @@ LINES = (
     ("export report/lq.json --c c --fmu lq.fmu --name lq", 0),
     ("export path-following-ppo --onnx policy.onnx", 0),
     ("export tanker --c tanker --depth 25", 0),
+    (f"train ppo {TASK_OF_OWN} {LEARNING} {SMALL} --seed 1 --threads 1 --out run", 0),
     (
-        f"train ppo {TASK_OF_OWN} {LEARNING} {SMALL} --randomise --seed"
-        " 1 --threads 1 --out run",
+        f"train ppo {TASK_OF_OWN} {LEARNING} {SMALL} --seed 1 --threads 1 --resume"
+        " --out run",
         0,
     ),
-    ("train ppo --resume --out run", 0),
-    (f"train ppo {TASK} {LEARNING} {SMALL} --compare pid --out run2", 0),
-    (
-        f"tune ppo {TASK_OF_OWN} {LEARNING} {SMALL} --randomise --trials 1 --seed 1"
-        " --engine local --workers 1 --out study",
-        0,
-    ),
-    (f"tune ppo {TASK} --address 127.0.0.1:9 --out study2", 2),
+    (f"train ppo {TASK} --model mariner --out run2", 2),
+    (f"tune ppo {TASK_OF_OWN} {LEARNING} {SMALL} --trials 1 --seed 1 --out study", 0),
+    (f"tune ppo {TASK} --model mariner --out study2", 2),
     (
         "benchmark --controllers pid,lq --suite small.toml --tasks calm --episodes 2"
         " --workers 1 --engine local --page --allow-code reward.py --out results",

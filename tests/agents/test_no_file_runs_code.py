@@ -15,8 +15,8 @@ from agents.cli import app
 from agents.cli.terminal import PlainConsole
 from agents.identifying import identification_settings
 from agents.suites.suite import parse_suite
-from agents.training.plan import TrainingRequest, make_plan
-from agents.training.run_folder import RUN, begin_folder, check_resumable, resumed
+from agents.training.plan import make_plan
+from agents.training.run_folder import begin_folder
 from identification.models.grey_box import chosen_box
 from shipgym import InputError, ShipFile, ShipModel, load_model
 from shipgym.pages.templates import environment
@@ -257,51 +257,6 @@ def test_a_ship_file_names_models_and_no_code(evil, option, full_name):
     box.compiled({}, False)
 
 
-@pytest.mark.parametrize(
-    ("place", "value"),
-    [
-        (("model",), "evil.py"),
-        (("options", "reward"), "evil.py"),
-        (("options", "reward"), "evil"),
-        (("options", "sensors"), "evil"),
-        (("options", "task"), "evil:factory"),
-        (("options", "ensemble"), ["mariner", "evil.py/."]),
-        (("environment",), "evil:CourseKeeping-v0"),
-        (("algorithm",), "evil.py"),
-        (("settings", "base"), "evil:factory"),
-        (("allow_code",), ["evil"]),
-    ],
-)
-def test_a_run_is_not_resumed_with_code_that_its_file_names(evil, place, value):
-    plan = make_plan(TrainingRequest("ppo", settings={"total_steps": 1}))
-    folder = evil.with_name("run")
-    begin_folder(folder, plan, "shipgym train")
-    content = json.loads((folder / RUN).read_text())
-    (folder / RUN).write_text(json.dumps(added(content, ("request", *place), value)))
-    with pytest.raises(InputError):
-        make_plan(resumed(folder, {}))
-    changed = added(content, ("request", "model"), str(evil))
-    (folder / RUN).write_text(json.dumps(changed))
-    with pytest.raises(InputError, match="a run of another configuration: model"):
-        check_resumable(folder, make_plan(resumed(folder, {})))
-
-
-def test_a_run_goes_on_with_the_code_that_its_user_names_again(tmp_path):
-    reward = tmp_path / "reward.py"
-    reward.write_text(
-        "from typing import NamedTuple\n\nclass Reward(NamedTuple):\n    heading:"
-        " float\n\n\ndef reward(motion, state, interval, ship, settings):\n    return"
-        " Reward(-state.heading_error**2)\n"
-    )
-    options = {"reward": str(reward)}
-    plan = make_plan(TrainingRequest("ppo", options=options))
-    begin_folder(tmp_path / "run", plan, "shipgym train")
-    again = make_plan(resumed(tmp_path / "run", {"options": options}))
-    assert again.configuration() == plan.configuration()
-    with pytest.raises(InputError, match=r"options\.reward: expected data"):
-        resumed(tmp_path / "run", {})
-
-
 @pytest.mark.parametrize("what", [open, exec])
 def test_a_checkpoint_runs_no_code(what, tmp_path):
     class Evil:
@@ -309,7 +264,7 @@ def test_a_checkpoint_runs_no_code(what, tmp_path):
             return what, ("RAN", "w") if what is open else (CODE,)
 
     torch = pytest.importorskip("torch")
-    plan = make_plan(TrainingRequest("ppo", settings={"total_steps": 1}))
+    plan = make_plan("ppo", settings={"total_steps": 1})
     begin_folder(tmp_path / "run", plan, "shipgym train")
     torch.save({"run": Evil()}, tmp_path / "run" / "checkpoint.pt")
     from agents.training.training import train

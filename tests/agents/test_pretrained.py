@@ -7,7 +7,7 @@ import pytest
 from agents import load_agent
 from agents.agent_file import list_pretrained
 from agents.rollouts.rollout import episode_costs
-from agents.training.plan import TrainingRequest, make_plan
+from agents.training.plan import make_plan
 
 ROUNDING = 1e-4  # of a cost over an episode, on other processors
 
@@ -20,13 +20,8 @@ def test_each_environment_has_an_agent():
 def test_an_agent_steers_its_environment_at_the_cost_on_its_record(name):
     agent = load_agent(name)
     record = agent.training
-    request = TrainingRequest(
-        "ppo",
-        environment=record["environment"],
-        model=record["model"],
-        settings=record["settings"],
-    )
-    plan = make_plan(request)
+    asked = {name: record[name] for name in ("environment", "model", "settings")}
+    plan = make_plan("ppo", **asked)
     assert record.items() >= plan.configuration().items()
     env = gym.make(agent.env_id)
     names = env.unwrapped.observation_names
