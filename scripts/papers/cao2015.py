@@ -19,7 +19,7 @@ from scipy.stats import spearmanr
 from identification.estimators.lssvm import LSSVM
 from identification.pipeline import identify
 from identification.samples.samples import build_samples
-from papers.row import Conclusion, Paper, Row
+from papers.row import Conclusion, Paper, Row, off, sampled, within
 from papers.sensitivity import sensitivity
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.models import ShipModel, load_model
@@ -30,15 +30,17 @@ Floats = NDArray[np.float64]
 C = {"u": 4e6, "v": 6e8, "r": 6e8}
 WITHIN = 1.0  # aim: error of a coefficient, %
 OF_SPAN = 0.1  # aim: rms error of a predicted trajectory, % of its span
-ACCEPTABLE, CLOSE = (
-    15.0,
-    5.0,
-)  # %: error of a derivative; rms error of a predicted channel, of its span
+ACCEPTABLE = 15.0  # error of a derivative, %
+CLOSE = 5.0  # rms error of a predicted channel, % of its span
 LINEAR = ("X_u", "Y_v", "Y_r", "Y_d", "N_v", "N_r", "N_d")
 LARGEST = f"largest error of {', '.join(LINEAR)}, %"
 COUNT = f"of the {40 - len(LINEAR)} other derivatives those within {ACCEPTABLE:g} %"
 RANKS = "rank correlation of a derivative's error with its effect on the 15/15"
-STRUCTURES = {"integral": "integral", "euler": "Euler"}
+#: Sample structures: name here, its first table, its figures.
+STRUCTURES = {
+    "integral": ("integral", 2, ("3, 4", "5, 6")),
+    "euler": ("Euler", 5, ("7, 8", "9, 10")),
+}
 
 #: Errors of Tables 2 to 7, %, in the order of the structure's terms (the printed column
 #: heads of the second rows of Tables 3, 4, 6 and 7 repeat others by mistake; the values
@@ -67,28 +69,18 @@ PRINTED: dict[str, dict[str, str]] = {
         ),
     },
 }
-TABLES = {
-    ("integral", "u"): 2,
-    ("integral", "v"): 3,
-    ("integral", "r"): 4,
-    ("euler", "u"): 5,
-    ("euler", "v"): 6,
-    ("euler", "r"): 7,
-}
 FORCES = {"u": "X", "v": "Y", "r": "N"}
 
 #: That the paper predicts, at the steps of the simulation.
 MANOEUVRES: dict[str, Callable[[ShipModel], Trial]] = {
     "25/25 zigzag": lambda ship: zigzag(ship, 25, 25, duration=800, dt=0.1),
-    "30 deg turning circle": lambda ship: turning_circle(
-        ship, 30, duration=800, dt=0.1
-    ),
+    "30 deg turning circle": lambda ship: turning_circle(ship, 30, 800, dt=0.1),
 }
 
 
 def sampled_zigzag() -> Trial:
     """The paper's trial: what it samples of the simulation."""
-    trial = zigzag(
+    run = zigzag(
         load_model("mariner"),
         15,
         15,
@@ -97,12 +89,7 @@ def sampled_zigzag() -> Trial:
         dt=0.1,
         switch="step",
     )
-    channels = {
-        name: trial[name][::5] for name in ("x", "y", "psi", "u", "v", "r", "delta")
-    }
-    return Trial(
-        trial.t[::5], channels, name="zigzag 15/15", kind="zigzag", length=trial.length
-    )
+    return sampled(run, 5, "zigzag 15/15")
 
 
 @cache
@@ -121,23 +108,18 @@ def as_printed(samples: str, by_length: bool = True) -> ShipModel:
     ShipModel
     """
     ship = load_model("mariner")
-    table = ship.table
+    table, particulars = ship.table, ship.particulars
     regression = build_samples(
-        [sampled_zigzag()],
-        table,
-        ship.particulars,
-        samples,
-        window=1,
-        smoothing="none",
+        [sampled_zigzag()], table, particulars, samples, window=1, smoothing="none"
     )
+    length = particulars.length if by_length else 1.0
     theta = []
     for q in table.equations:
-        length = ship.particulars["length"] if by_length else 1.0
         lengths = np.array([length ** term.power("r") for term in table.terms(q)])
         estimator = LSSVM(C=C[q], scale=False, fit_intercept=False)
         estimator.fit(regression.features[q] * lengths, regression.targets[q])
         theta.append(estimator.coef_ * lengths)
-    matrix = table.acceleration_matrix(ship.particulars)
+    matrix = table.acceleration_matrix(particulars)
     values = np.linalg.solve(matrix, np.concatenate(theta)).tolist()
     return replace(
         ship, coefficients=dict(zip(table.coefficient_names, values, strict=True))
@@ -171,116 +153,84 @@ def printed_errors(samples: str, equation: str) -> Mapping[str, float]:
 
 
 def table_rows() -> Iterator[Row]:
-    """Tables 2 to 7: the error of each coefficient."""
+    """Tables 2 to 7: the error of each coefficient.
+
+    And why the columns hold r L: with r, as printed, the penalty holds back X_rr.
+    """
     best = errors(at_best())
-    for samples in ("integral", "euler"):
+    for samples, (_, first, _) in STRUCTURES.items():
         ours = errors(as_printed(samples))
-        for equation in FORCES:
+        for table, equation in enumerate(FORCES, start=first):
             for name, printed in printed_errors(samples, equation).items():
                 yield Row(
-                    f"Table {TABLES[samples, equation]}",
+                    f"Table {table}",
                     f"{name}: error, %",
                     printed,
                     ours[name],
                     best[name],
-                    f"within {WITHIN:g}",
-                    best[name] < WITHIN,
+                    *within(WITHIN, best[name]),
                 )
+        yield Row(
+            f"Table {first}",
+            "X_rr with r and not r L in the columns: error, %",
+            None,
+            errors(as_printed(samples, by_length=False))["X_rr"],
+        )
 
 
 def prediction_rows() -> Iterator[Row]:
     """Figures 3 to 10: 25/25 zigzag and 30 deg turning circle of identified models."""
-    figures = {"integral": ("3, 4", "5, 6"), "euler": ("7, 8", "9, 10")}
-    for samples, numbers in figures.items():
-        ours = as_printed(samples)
-        for figure, (name, run) in zip(numbers, MANOEUVRES.items(), strict=True):
-            truth = run(load_model("mariner"))
+    for samples, (_, _, figures) in STRUCTURES.items():
+        for figure, (name, run) in zip(figures, MANOEUVRES.items(), strict=True):
+            truth, ours, best = map(
+                run, (load_model("mariner"), as_printed(samples), at_best())
+            )
             for channel in ("u", "v", "r", "psi", "x", "y"):
-                theirs, best = (
-                    off(run(model), truth, channel) for model in (ours, at_best())
-                )
+                least = off(best, truth, channel)
                 yield Row(
                     f"Figures {figure}",
                     f"{name}, {channel}: rms error, % of span",
                     None,
-                    theirs,
-                    best,
-                    f"below {OF_SPAN:g}",
-                    best < OF_SPAN,
-                    "the paper shows a picture",
+                    off(ours, truth, channel),
+                    least,
+                    *within(OF_SPAN, least),
                 )
 
 
-def off(trial: Trial, truth: Trial, channel: str) -> float:
-    """Root mean square error of a channel, % of its span."""
-    return float(
-        100.0
-        * np.sqrt(np.mean((trial[channel] - truth[channel]) ** 2))
-        / np.ptp(truth[channel])
-    )
-
-
-def column_rows() -> Iterator[Row]:
-    """Why the columns hold r L: with r, as printed, X_rr does not come out."""
-    for samples, table in (("integral", 2), ("euler", 5)):
-        yield Row(
-            f"Table {table}",
-            "X_rr with r and not r L in the columns: error, %",
-            None,
-            errors(as_printed(samples, by_length=False))["X_rr"],
-            None,
-            note=(
-                "with the printed columns the penalty holds back what multiplies the"
-                " small r"
-            ),
-        )
+MEASURES: dict[str, Callable[[Mapping[str, float]], float]] = {
+    LARGEST: lambda errors: max(errors[name] for name in LINEAR),
+    COUNT: lambda errors: sum(
+        error <= ACCEPTABLE for name, error in errors.items() if name not in LINEAR
+    ),
+    "largest error of all, %": lambda errors: max(errors.values()),
+}
 
 
 def summary_rows() -> Iterator[Row]:
-    """What the paper concludes of its tables as a whole, counted."""
-    for samples, structure in STRUCTURES.items():
-        printed = {
-            name: value
-            for q in FORCES
-            for name, value in printed_errors(samples, q).items()
-        }
-        found, best = errors(as_printed(samples)), errors(at_best())
-        measures: dict[str, Callable[[Mapping[str, float]], float]] = {
-            LARGEST: lambda values: max(values[name] for name in LINEAR),
-            COUNT: lambda values: sum(
-                error <= ACCEPTABLE
-                for name, error in values.items()
-                if name not in LINEAR
-            ),
-            "largest error of all, %": lambda values: max(values.values()),
-        }
-        for what, measure in measures.items():
-            values = [float(measure(one)) for one in (printed, found, best)]
-            yield Row(
-                "Section 4", f"{structure}: {what}", values[0], values[1], values[2]
-            )
+    """What the paper concludes of its tables as a whole, counted.
+
+    A rank correlation of -1: the less a derivative does, the worse it is found.
+    """
     effects = sensitivity(
         load_model("mariner"), lambda ship: zigzag(ship, 15, 15, duration=500, dt=0.1)
     )
-    for samples, structure in STRUCTURES.items():
+    for samples, (structure, *_) in STRUCTURES.items():
+        printed = {
+            name: error
+            for q in FORCES
+            for name, error in printed_errors(samples, q).items()
+        }
         found = errors(as_printed(samples))
-        ranks = spearmanr(
-            [effects[name] for name in found], list(found.values())
-        ).statistic
-        yield Row(
-            "Section 4",
-            f"{structure}: {RANKS}",
-            None,
-            float(ranks),
-            None,
-            note="-1: the less a derivative does, the worse it is found",
-        )
+        for what, measure in MEASURES.items():
+            values = map(measure, (printed, found, errors(at_best())))
+            yield Row("Section 4", f"{structure}: {what}", *values)
+        ranks = spearmanr([effects[name] for name in found], list(found.values()))
+        yield Row("Section 4", f"{structure}: {RANKS}", None, float(ranks.statistic))
 
 
 def rows() -> Iterator[Row]:
     """All rows."""
     yield from table_rows()
-    yield from column_rows()
     yield from prediction_rows()
     yield from summary_rows()
 
@@ -296,14 +246,14 @@ _ZIGZAG, _TURN = (
 CONCLUSIONS = (
     Conclusion(
         "The linear derivatives are found accurately by either sample structure",
-        tuple(_summary(structure, LARGEST) for structure in STRUCTURES.values()),
+        tuple(_summary(structure, LARGEST) for structure, *_ in STRUCTURES.values()),
         lambda *found: all(row.as_paper <= ACCEPTABLE for row in found),
         f"accurate: within {ACCEPTABLE:g} %, as the printed ones are",
     ),
     Conclusion(
         "Most of the others are acceptable by the integral structure, and badly off by"
         " Euler's",
-        tuple(_summary(structure, COUNT) for structure in STRUCTURES.values()),
+        tuple(_summary(structure, COUNT) for structure, *_ in STRUCTURES.values()),
         lambda integral, euler: integral.as_paper > 16 > euler.as_paper,
         f"most: more than 16 of 33; acceptable: within {ACCEPTABLE:g} %",
     ),
@@ -311,7 +261,7 @@ CONCLUSIONS = (
         "Some are always far off, but far less so by the integral structure",
         tuple(
             _summary(structure, "largest error of all, %")
-            for structure in STRUCTURES.values()
+            for structure, *_ in STRUCTURES.values()
         ),
         lambda integral, euler: ACCEPTABLE < integral.as_paper < 0.1 * euler.as_paper,
         'far less: by a factor of ten; "always" is a matter of the quadrature: at best'
@@ -325,7 +275,7 @@ CONCLUSIONS = (
     ),
     Conclusion(
         "A derivative with little effect on the motion is poorly identified",
-        tuple(_summary(structure, RANKS) for structure in STRUCTURES.values()),
+        tuple(_summary(structure, RANKS) for structure, *_ in STRUCTURES.values()),
         lambda *found: all(row.as_paper < -0.5 for row in found),
         "rank correlation below -0.5",
     ),

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
-from sklearn.metrics import r2_score
 
 from identification.arrays import root_mean_square
 from identification.estimators.estimator import Estimator
@@ -93,15 +92,6 @@ class ForceRegression:
         own = [self.targets[self.equation == i] for i in range(len(FORCES))]
         by_force = np.array([root_mean_square(targets) for targets in own])
         return by_force[self.equation]
-
-    def r_squared(self, coefficients: Floats) -> dict[str, float]:
-        """Share of the variance of X, Y and N that is explained (equation 22)."""
-        fitted = self.features @ coefficients
-        shares = {}
-        for i, force in enumerate(FORCES):
-            own = self.equation == i
-            shares[force] = float(r2_score(self.targets[own], fitted[own]))
-        return shares
 
 
 def force_regression(
@@ -194,21 +184,10 @@ def fit_forces(
     residuals = targets - estimator.predict(features)
     half = features @ estimator.inverse_moment_
     leverages = np.sum(half * features, axis=1)
-    by_force = force_variances(regression.equation, residuals, leverages)
-    covariance = (half.T * by_force[regression.equation]) @ half
-    return estimator.coef_, 0.5 * (covariance + covariance.T)
-
-
-def force_variances(equation: Integers, residuals: Floats, leverages: Floats) -> Floats:
-    """Variances of the errors of X, Y and N, each by its residuals, shape (3, ...).
-
-    `equation`: 0, 1, 2 for X, Y, N, shape (n_rows,); `residuals`: of the fit, shape
-    (n_rows, ...); `leverages`: diagonal of the matrix that maps targets to fitted
-    values, shape (n_rows,).
-    """
-    variances = []
+    variances = np.empty_like(targets)
     for i in range(len(FORCES)):
-        own = equation == i
-        freedom = float(np.sum(1.0 - leverages[own]))
-        variances.append(np.sum(residuals[own] ** 2, axis=0) / freedom)
-    return np.array(variances)
+        own = regression.equation == i
+        freedom = np.sum(1.0 - leverages[own])
+        variances[own] = np.sum(residuals[own] ** 2) / freedom
+    covariance = (half.T * variances) @ half
+    return estimator.coef_, 0.5 * (covariance + covariance.T)

@@ -9,28 +9,23 @@ it is 1 here, on standardised samples.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
+from dataclasses import replace
 
 from identification.models.similarity import correlations, select_reference
 from papers.mei2019_targets import (
-    SHOWN,
     TANKER,
     Target,
     acceleration_correlations,
     heading_correlation,
     measured,
-    off,
     our_way,
     papers_way,
     same_hull,
-    taught_the_turns,
-    usual_way,
     virtual,
 )
-from papers.row import Conclusion, Paper, Row
-from shipgym.models import ShipModel, load_model
-
-Pair = tuple[float | None, float | None]  # their way, at best
+from papers.row import Conclusion, Paper, Row, within
+from shipgym.models import load_model
 
 #: Table 4: block coefficient, L/B, B/T, L/V0 in s, rudder area by L T; the correlation
 #: printed with it.
@@ -54,11 +49,11 @@ HARD = 35.0  # rudder of the turns, degrees
 MEASURED = {"overshoot_1": 13.8, "overshoot_2": 14.9, "advance": 3.25, "tactical": 3.34}
 PRINTED = {"overshoot_1": 11.8, "overshoot_2": 14.3, "advance": 3.22, "tactical": 3.20}
 PRINTED_PORT = {"advance": 3.26, "tactical": 3.24}
-#: "EFD-NMRI" of Tables 6 and 7, which cites the authors of the MMG model that is the
-#: target here.
-NMRI = {
-    HARD: {"advance": 3.31, "tactical": 3.36},
-    -HARD: {"advance": 3.26, "tactical": 3.26},
+#: Figures 5 and 6: correlation of accelerations, insensitive band.
+PRINTED_FIGURES = {
+    "u": ("surge", 0.99, 0.005),
+    "v": ("sway", 0.94, 1.0),
+    "r": ("yaw", 0.87, 1.0),
 }
 WORDS = {"advance": "advance", "tactical": "tactical diameter"}
 WITHIN = 1.0  # aim for the virtual ship, %
@@ -67,26 +62,23 @@ WITHIN_MEASURED = {
     "tactical": 4.0,
 }  # what the paper reaches at +35, rounded, %
 
-BARE = "bare reference"
-EACH = "weight by each trial held out"
+BARE = ", bare reference"
 VIRTUAL = "Tables 6, 7: MMG model as target"
-NO_DATA = "data not at hand: MARIN's zigzags are no part of this project"
-VIRTUAL_TANKER = f"{VIRTUAL}, by the tanker at best"
 
 
 def rows() -> Iterator[Row]:
     """All rows."""
     yield from selection_rows()
     yield from virtual_rows()
-    yield from tanker_rows()
     target = measured()
-    yield from figure_rows(target)
-    yield from overshoot_rows(target)
-    yield from turn_rows(target)
+    if target is not None:
+        yield from figure_rows(target)
+        yield from overshoot_rows(target)
+        yield from turn_rows(target)
 
 
 def selection_rows() -> Iterator[Row]:
-    """Table 4: which ship is most like KVLCC2."""
+    """Table 4, rounded in print: which ship is most like KVLCC2."""
     found = correlations(
         KVLCC2, {name: features for name, (features, _) in TABLE_4.items()}
     )
@@ -101,295 +93,122 @@ def selection_rows() -> Iterator[Row]:
             ours.get(SHIPPED.get(name, "")),
             f"their way within {ROUNDING:g}",
             abs(found[name] - printed) < ROUNDING,
-            (
-                "the table is rounded; at best: the ships that are here, with sqrt(g"
-                " L)/V0 in place of L/V0"
-                if name in SHIPPED
-                else "the table is rounded; this ship is not here"
-            ),
         )
-    chosen = [
-        max(found, key=lambda name: found[name]),
-        max(ours, key=lambda name: ours[name]),
-    ]
+    theirs = max(found, key=found.__getitem__)
+    best = max(ours, key=ours.__getitem__)
     yield Row(
         "Table 4",
         "the tanker is chosen (1: yes)",
         1.0,
-        float(chosen[0] == "Tanker"),
-        float(chosen[1] == TANKER),
+        float(theirs == "Tanker"),
+        float(best == TANKER),
         "yes",
-        chosen == ["Tanker", TANKER],
+        (theirs, best) == ("Tanker", TANKER),
     )
 
 
 def virtual_rows() -> Iterator[Row]:
-    """The MMG model as target: errors of the turns and of figures 8 and 9."""
+    """The MMG model as target: errors of the turns, %.
+
+    As the paper: the tanker is the reference; at best: the same hull at full scale.
+    """
     target, hull = virtual(), same_hull()
     fits = (papers_way(target).model, our_way(target, hull).model)
     bare = (target.bare(TANKER), target.bare(hull))
     for rudder in (HARD, -HARD):
-        truth = target.turn_indices(target.ship, rudder)
-        for index, words in WORDS.items():
-            yield Row(
-                VIRTUAL,
-                f"{rudder:+.0f} deg: {words} of the target, L",
-                NMRI[rudder][index],
-                None,
-                truth[index],
-                note=(
-                    "printed as EFD-NMRI, by the authors of this model; measured or"
-                    " computed"
-                ),
-            )
+        truth = target.turn(target.ship, rudder)
         for models, kind in ((bare, BARE), (fits, "")):
-            found = [target.turn_indices(model, rudder) for model in models]
+            found = [target.turn(model, rudder) for model in models]
             for index, words in WORDS.items():
-                errors = _pair(
-                    _error(indices[index], truth[index]) for indices in found
+                theirs, best = (
+                    100.0 * (one[index] / truth[index] - 1.0) for one in found
                 )
-                yield _virtual_row(
-                    rudder, index, f"{words}{kind and ', ' + kind}", errors, kind == ""
+                is_printed = rudder > 0.0 and not kind
+                printed = 100.0 * (PRINTED[index] / MEASURED[index] - 1.0)
+                yield Row(
+                    VIRTUAL,
+                    f"{rudder:+.0f} deg: {words}{kind}, error, %",
+                    printed if is_printed else None,
+                    theirs,
+                    best,
+                    *(() if kind else within(WITHIN, best)),
                 )
-        turn = target.turn(target.ship, rudder)
-        assert turn is not None
-        runs = [target.turn(model, rudder) for model in fits]
-        for channel in ("u", "v", "r"):
-            yield Row(
-                f"Figure {8 if rudder > 0.0 else 9}: MMG model as target",
-                f"{rudder:+.0f} deg, {channel}: rms error, % of span",
-                None,
-                *_pair(off(run, turn, channel) for run in runs),
-                note="the paper shows a picture",
-            )
-
-
-def _virtual_row(
-    rudder: float, index: str, words: str, errors: Pair, aimed: bool
-) -> Row:
-    printed = (
-        100.0 * (PRINTED[index] / MEASURED[index] - 1.0)
-        if aimed and rudder > 0.0
-        else None
-    )
-    return Row(
-        VIRTUAL,
-        f"{rudder:+.0f} deg: {words}, error, %",
-        printed,
-        *errors,
-        f"within {WITHIN:g}" if aimed else "",
-        _within(errors[1], WITHIN) if aimed else None,
-        "as the paper: reference tanker; at best: the same hull at full scale",
-    )
-
-
-def tanker_rows() -> Iterator[Row]:
-    """The tanker's least error: the same terms, fitted to the turns themselves."""
-    target = virtual()
-    ours, hindsight = our_way(target, TANKER).model, taught_the_turns(HARD)
-    for rudder in (HARD, -HARD):
-        truth, mine, taught = (
-            target.turn_indices(m, rudder) for m in (target.ship, ours, hindsight)
-        )
+        found_tanker = target.turn(our_way(target, TANKER).model, rudder)
         for index, words in WORDS.items():
-            error, limit = (
-                _error(found[index], truth[index]) for found in (mine, taught)
-            )
-            met = _within(error, WITHIN)
+            error = 100.0 * (found_tanker[index] / truth[index] - 1.0)
             yield Row(
-                VIRTUAL_TANKER,
-                f"{rudder:+.0f} deg: {words}, error, %",
+                f"{VIRTUAL}, by the tanker at best",
+                f"{rudder:+.0f} deg: {words}, error by the tanker, %",
                 None,
                 None,
                 error,
-                f"within {WITHIN:g}",
-                met,
-                (
-                    ""
-                    if met or limit is None
-                    else (
-                        "the limit is the form, not the zigzags: tanker and linear"
-                        " terms, by least squares of the zigzags and of these turns"
-                        f" themselves, are off by {limit:+.1f} %"
-                    )
-                ),
+                *within(WITHIN, error),
             )
 
 
-def figure_rows(target: Target | None) -> Iterator[Row]:
-    """Figures 5 (reference and target), 6 (pattern search) and 7 (20/20 zigzag)."""
-    pairs = _figure_pairs(target)
-    for q, word, printed in (
-        ("u", "surge", 0.99),
-        ("v", "sway", 0.94),
-        ("r", "yaw", 0.87),
-    ):
-        yield _measured_row(
-            "Figure 5",
-            f"correlation of {word} accelerations, reference and target",
-            printed,
-            pairs.get(f"acceleration {q}", ()),
-            note=(
-                "at best: with the correction; means over a window of samples, not"
-                " filtered derivatives"
-            ),
-        )
-    for q, word, printed in (
-        ("u", "surge", 0.005),
-        ("v", "sway", 1.0),
-        ("r", "yaw", 1.0),
-    ):
-        yield _measured_row(
-            "Figure 6",
-            f"insensitive band of {word}",
-            printed,
-            pairs.get(f"band {q}", ()),
-            note="the best bands depend on C, which is not printed",
-        )
-    yield _measured_row(
-        "Figure 6",
-        "correlation of headings, 20/20 zigzag",
-        0.993,
-        pairs.get("heading", ()),
-        note="open loop from the measured rudder",
-    )
-    for channel in ("u", "v", "r", "psi"):
-        yield _measured_row(
-            "Figure 7",
-            f"20/20 zigzag, {channel}: rms error, % of span",
-            None,
-            pairs.get(f"off {channel}", ()),
-            note="the paper shows a picture; open loop from the measured rudder",
-        )
-
-
-def _figure_pairs(target: Target | None) -> dict[str, Pair]:
-    """Errors their way and at best, by quantity; empty where the data is missing."""
-    if target is None:
-        return {}
+def figure_rows(target: Target) -> Iterator[Row]:
+    """Figures 5 (reference and target) and 6 (pattern search)."""
     fits = (papers_way(target), our_way(target, TANKER))
     models = (target.bare(TANKER), fits[1].model)
     accelerations = [acceleration_correlations(target, model) for model in models]
     searches = [(fit.model.provenance or {})["search"] for fit in fits]
-    pairs: dict[str, Pair] = {
-        "heading": _pair(heading_correlation(target, fit) for fit in fits)
-    }
-    for q in ("u", "v", "r"):
-        pairs[f"acceleration {q}"] = _pair(found[q] for found in accelerations)
-        pairs[f"band {q}"] = _pair(search[q]["epsilon"] for search in searches)
-    for channel in ("u", "v", "r", "psi"):
-        truth = target.trial(SHOWN)
-        pairs[f"off {channel}"] = _pair(
-            off(fit.predictions[SHOWN], truth, channel) for fit in fits
+    for q, (word, correlation, band) in PRINTED_FIGURES.items():
+        yield Row(
+            "Figure 5: MARIN",
+            f"correlation of {word} accelerations, reference and target",
+            correlation,
+            *(found[q] for found in accelerations),
         )
-    return pairs
+        yield Row(
+            "Figure 6: MARIN",
+            f"insensitive band of {word}",
+            band,
+            *(search[q]["epsilon"] for search in searches),
+        )
+    yield Row(
+        "Figure 6: MARIN",
+        "correlation of headings, 20/20 zigzag",
+        0.993,
+        *(heading_correlation(target, fit) for fit in fits),
+    )
 
 
-def overshoot_rows(target: Target | None) -> Iterator[Row]:
+def overshoot_rows(target: Target) -> Iterator[Row]:
     """Table 5: the 20/20 zigzag, steered by the model's own heading."""
-    for kind, models in _measured_models(target).items():
-        found = [target.overshoots(model) for model in models] if target else []
-        for index, word in (("overshoot_1", "1st"), ("overshoot_2", "2nd")):
-            yield _measured_row(
-                "Table 5",
-                f"20/20: {word} overshoot, deg{kind and ', ' + kind}",
-                PRINTED[index] if kind == "" else None,
-                [values[index] for values in found],
-                aim=(
-                    (MEASURED[index], abs(PRINTED[index] - MEASURED[index]))
-                    if kind == ""
-                    else None
-                ),
-                words=f"nearer to {MEASURED[index]:g} than printed",
-            )
+    models = papers_way(target).model, our_way(target, TANKER).model
+    theirs, best = (target.overshoots(model) for model in models)
+    for index, word in (("overshoot_1", "1st"), ("overshoot_2", "2nd")):
+        truth, printed = MEASURED[index], PRINTED[index]
+        yield Row(
+            "Table 5: MARIN",
+            f"20/20: {word} overshoot, deg",
+            printed,
+            theirs[index],
+            best[index],
+            f"nearer to {truth:g} than printed",
+            abs(best[index] - truth) < abs(printed - truth),
+        )
 
 
-def turn_rows(target: Target | None) -> Iterator[Row]:
+def turn_rows(target: Target) -> Iterator[Row]:
     """Tables 6 and 7: the turns, which no zigzag shows."""
-    models = _measured_models(target)
-    models[EACH] = [] if target is None else [usual_way(target, TANKER).model]
+    models = (papers_way(target).model, our_way(target, TANKER).model)
     for rudder, printed in ((HARD, PRINTED), (-HARD, PRINTED_PORT)):
-        for kind, compared in models.items():
-            found = (
-                [target.turn_indices(model, rudder) for model in compared]
-                if target
-                else []
-            )
-            for index, words in WORDS.items():
-                aimed = kind == "" and rudder > 0.0
-                within = WITHIN_MEASURED[index]
-                yield _measured_row(
-                    f"Table {6 if rudder > 0.0 else 7}",
-                    f"{rudder:+.0f} deg: {words}, L{kind and ', ' + kind}",
-                    printed[index] if kind == "" else None,
-                    [values[index] for values in found],
-                    aim=(
-                        (MEASURED[index], 0.01 * within * MEASURED[index])
-                        if aimed
-                        else None
-                    ),
-                    words=f"within {within:g} % of {MEASURED[index]:g}",
-                    note=(
-                        ""
-                        if rudder > 0.0
-                        else "the measured values printed for -35 are those of +35"
-                    ),
-                )
+        theirs, best, bare = (
+            target.turn(model, rudder) for model in (*models, target.bare(TANKER))
+        )
+        case = f"Table {6 if rudder > 0.0 else 7}: MARIN"
+        for index, words in WORDS.items():
+            what, limit = f"{rudder:+.0f} deg: {words}, L", WITHIN_MEASURED[index]
+            off = 100.0 * abs(best[index] / MEASURED[index] - 1.0)
+            aim = f"within {limit:g} % of {MEASURED[index]:g}"
+            row = Row(case, what, printed[index], theirs[index], best[index])
+            yield replace(row, aim=aim, met=off < limit) if rudder > 0.0 else row
+            yield Row(case, f"{what}{BARE}", None, None, bare[index])
 
 
-def _measured_models(target: Target | None) -> dict[str, list[ShipModel]]:
-    """Errors their way, at best and of the bare reference; none without the data."""
-    if target is None:
-        return {"": [], BARE: []}
-    return {
-        "": [papers_way(target).model, our_way(target, TANKER).model],
-        BARE: [target.bare(TANKER)],
-    }
-
-
-def _measured_row(
-    case: str,
-    quantity: str,
-    printed: float | None,
-    ours: Sequence[float | None],
-    aim: tuple[float, float] | None = None,
-    words: str = "",
-    note: str = "",
-) -> Row:
-    """A row on MARIN's zigzags.
-
-    `ours` is their way and at best, or at best alone, and empty where the data is not
-    at hand; `aim` is a value and how far off one may be.
-    """
-    case = f"{case}: MARIN"
-    if not ours:
-        return Row(case, quantity, printed, None, None, note=NO_DATA)
-    theirs, best = (None, *ours)[-2:]
-    met = None if aim is None else best is not None and abs(best - aim[0]) < aim[1]
-    return Row(
-        case, quantity, printed, theirs, best, "" if aim is None else words, met, note
-    )
-
-
-def _pair(values: Iterable[float | None]) -> Pair:
-    """Their way and at best."""
-    theirs, best = values
-    return theirs, best
-
-
-def _error(value: float | None, truth: float | None) -> float | None:
-    return None if value is None or truth is None else 100.0 * (value / truth - 1.0)
-
-
-def _within(error: float | None, limit: float) -> bool:
-    return error is not None and abs(error) < limit
-
-
-def _turn(rudder: float, words: str, kind: str = "") -> str:
-    return (
-        f"Table {6 if rudder > 0.0 else 7}: MARIN: {rudder:+.0f} deg: {words},"
-        f" L{kind and ', ' + kind}"
-    )
+def _turn(words: str, kind: str = "") -> str:
+    return f"Table 6: MARIN: +35 deg: {words}, L{kind}"
 
 
 def _off(row: Row, index: str) -> float:
@@ -417,7 +236,7 @@ CONCLUSIONS = (
     ),
     Conclusion(
         "RM-SVM predicts turns from zigzags of small rudder angles (generalisation)",
-        tuple(_turn(HARD, words) for words in WORDS.values()),
+        tuple(_turn(words) for words in WORDS.values()),
         lambda advance, tactical: (
             _off(advance, "advance") < 0.05 and _off(tactical, "tactical") < 0.05
         ),
@@ -428,8 +247,8 @@ CONCLUSIONS = (
         "It is the support vector machine that makes the prediction accurate, beyond"
         " the reference ship",
         (
-            *(_turn(HARD, words) for words in WORDS.values()),
-            *(_turn(HARD, words, BARE) for words in WORDS.values()),
+            *(_turn(words) for words in WORDS.values()),
+            *(_turn(words, BARE) for words in WORDS.values()),
         ),
         lambda advance, tactical, bare_advance, bare_tactical: (
             _off(advance, "advance") < _off(bare_advance, "advance")
@@ -441,7 +260,7 @@ CONCLUSIONS = (
         "The same with the MMG model as the target",
         tuple(
             f"{VIRTUAL}: +35 deg: {words}{kind}, error, %"
-            for kind in ("", f", {BARE}")
+            for kind in ("", BARE)
             for words in WORDS.values()
         ),
         lambda advance, tactical, bare_advance, bare_tactical: (

@@ -14,15 +14,13 @@ from sklearn.svm import SVR
 
 from identification import RMSVM
 from identification.estimators.linear import validated
-from identification.models.guard import with_coefficients
-from identification.models.methods import fit_all, get_method
 from identification.models.similarity import select_reference
 from identification.pipeline import identify
 from identification.pipeline.result import IdentificationResult
-from identification.samples.folds import LARGEST_RUDDER, TRIALS
+from identification.samples.folds import LARGEST_RUDDER
 from identification.samples.prediction import predict
 from identification.samples.samples import build_samples
-from shipgym.errors import UnstableModelError
+from papers.row import sampled
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
 from shipgym.models import ShipModel, converted_model, load_model
 from shipgym.ships import GreyBox, get_structure
@@ -31,18 +29,7 @@ from shipgym.trials.trial import Trial
 Floats = NDArray[np.float64]
 
 TANKER = "tanker"
-CANDIDATES = (
-    "mariner",
-    "container",
-    TANKER,
-    "kvlcc2",
-)  # for the virtual ship: all but herself
-ZIGZAGS = (
-    (10.0, False),
-    (10.0, True),
-    (20.0, False),
-    (20.0, True),
-)  # rudder and heading, port first
+CANDIDATES = ("mariner", "container", TANKER, "kvlcc2")  # all but the virtual ship
 SHOWN = "20-starboard"  # the zigzag of Table 5 and of figures 6 and 7
 STEPS_PER_SAMPLE = 4
 TURN, ZIGZAG = 15.0, 20.0  # ship lengths at service speed that are simulated
@@ -155,109 +142,71 @@ class Target:
             reference, self.ship.particulars, self.ship.steering, shaft
         )
 
-    def turn(self, model: ShipModel, rudder_deg: float) -> Trial | None:
-        """A turning circle; None where the model runs away."""
-        try:
-            return turning_circle(
-                model, rudder_deg, duration=TURN * self.travel, dt=0.01 * self.travel
-            )
-        except UnstableModelError:
-            return None
-
-    def turn_indices(
-        self, model: ShipModel, rudder_deg: float
-    ) -> dict[str, float | None]:
-        """Advance and tactical diameter, lengths."""
-        run = self.turn(model, rudder_deg)
-        if run is None:
-            return {"advance": None, "tactical": None}
+    def turn(self, model: ShipModel, rudder_deg: float) -> dict[str, float]:
+        """Advance and tactical diameter of a turning circle, lengths."""
+        dt = 0.01 * self.travel
+        run = turning_circle(model, rudder_deg, duration=TURN * self.travel, dt=dt)
         found = turning_indices(run, self.ship.particulars.length)
-        return {
-            "advance": found.advance_lengths,
-            "tactical": found.tactical_diameter_lengths,
-        }
+        lengths = found.advance_lengths, found.tactical_diameter_lengths
+        return dict(zip(("advance", "tactical"), map(float, lengths), strict=True))
 
-    def overshoots(self, model: ShipModel) -> dict[str, float | None]:
+    def overshoots(self, model: ShipModel) -> dict[str, float]:
         """First and second overshoot of a 20/20 zigzag to starboard, degrees."""
-        run = zigzag(
-            model, 20, 20, duration=ZIGZAG * self.travel, dt=0.01 * self.travel
-        )
+        dt = 0.01 * self.travel
+        run = zigzag(model, 20, 20, duration=ZIGZAG * self.travel, dt=dt)
         found = zigzag_indices(run, self.ship.particulars.length)
-        return {
-            "overshoot_1": found.overshoot_1_deg,
-            "overshoot_2": found.overshoot_2_deg,
-        }
+        angles = {"overshoot_1": found.overshoot_1_deg}
+        angles["overshoot_2"] = found.overshoot_2_deg
+        return {name: float(angle) for name, angle in angles.items()}
 
 
 @cache
 def virtual() -> Target:
     """The MMG model of KVLCC2 at model scale without noise, at 1 Hz at full scale."""
     ship = load_model("kvlcc2-l7")
-    second = float(
-        np.sqrt(ship.particulars.length / load_model("kvlcc2").particulars.length)
-    )
-    trials = tuple(
-        _recorded(
-            zigzag(
+    full_scale = load_model("kvlcc2").particulars.length
+    second = float(np.sqrt(ship.particulars.length / full_scale))
+    trials = []
+    for angle in (10, 20):
+        for side in ("starboard", "port"):
+            run = zigzag(
                 ship,
                 angle,
                 angle,
                 duration=600.0 * second,
                 dt=second / STEPS_PER_SAMPLE,
-                port_first=port,
-            ),
-            ship,
-            f"{angle:g}-{'port' if port else 'starboard'}",
-        )
-        for angle, port in ZIGZAGS
-    )
-    return Target(ship, trials, ship.service_shaft_speed)
-
-
-def _recorded(run: Trial, ship: ShipModel, name: str) -> Trial:
-    """Record of the paper's tank: every so many steps, shaft speed, no orders."""
-    channels = {
-        c: run[c][::STEPS_PER_SAMPLE] for c in ("x", "y", "psi", "u", "v", "r", "delta")
-    }
-    channels["n"] = np.full(len(channels["u"]), ship.service_shaft_speed)
-    return Trial(
-        run.t[::STEPS_PER_SAMPLE],
-        channels,
-        name=name,
-        kind=run.kind,
-        length=ship.particulars.length,
-    )
+                port_first=side == "port",
+            )
+            log = sampled(run, STEPS_PER_SAMPLE, f"{angle}-{side}")
+            shaft = {"n": np.full(len(log), ship.service_shaft_speed)}
+            channels = {**log.channels, **shaft}
+            trials.append(Trial(log.t, channels, name=log.name, kind=log.kind))
+    return Target(ship, tuple(trials), ship.service_shaft_speed)
 
 
 @cache
-def measured(folder: Path = DATA) -> Target | None:
-    """MARIN's zigzags scaled to the ship, at 1 Hz; None where the files are missing."""
-    if not all((folder / f"{file}.csv").is_file() for file in FILES.values()):
+def measured() -> Target | None:
+    """MARIN's zigzags scaled to the ship, every other sample, 1.08 s apart.
+
+    None where the files are missing.
+    """
+    if not DATA.is_dir():
         return None
     ship = load_model("kvlcc2")
-    trials = tuple(
-        _second_by_second(
-            Trial.from_csv(
-                folder / f"{file}.csv",
-                COLUMNS,
-                rudder_positive="port",
-                velocity_frame="earth",
-                name=name,
-                kind="zigzag",
-                length=ship.particulars.length,
-            )
+    trials = [
+        Trial.from_csv(
+            DATA / f"{file}.csv",
+            COLUMNS,
+            rudder_positive="port",
+            velocity_frame="earth",
+            name=name,
+            kind="zigzag",
+            length=ship.particulars.length,
         )
         for name, file in FILES.items()
-    )
-    return Target(ship, trials, None)
-
-
-def _second_by_second(trial: Trial) -> Trial:
-    """Every other sample, 1.08 s apart."""
-    channels = {name: values[::2] for name, values in trial.channels.items()}
-    return Trial(
-        trial.t[::2], channels, name=trial.name, kind=trial.kind, length=trial.length
-    )
+    ]
+    every_other = [sampled(run, 2, run.name, run.channels) for run in trials]
+    return Target(ship, tuple(every_other), None)
 
 
 @cache
@@ -272,12 +221,6 @@ def our_way(target: Target, reference: str) -> IdentificationResult:
     return target.fit(reference, RMSVM(folds=LARGEST_RUDDER))
 
 
-@cache
-def usual_way(target: Target, reference: str) -> IdentificationResult:
-    """As `our_way`, weighted by fits of three trials that predict the fourth."""
-    return target.fit(reference, RMSVM(folds=TRIALS))
-
-
 def same_hull() -> str:
     """The other reference ship most like the virtual ship, at full scale."""
     target = virtual()
@@ -286,51 +229,10 @@ def same_hull() -> str:
     )[0]
 
 
-@cache
-def taught_the_turns(rudder_deg: float) -> ShipModel:
-    """The tanker and linear terms by least squares of zigzags and target turns."""
-    target = virtual()
-    ship, gear = target.ship.particulars, target.ship.steering
-    turns = [
-        _recorded(
-            turning_circle(
-                target.ship,
-                rudder,
-                duration=TURN * target.travel,
-                dt=0.005 * target.travel,
-            ),
-            target.ship,
-            f"turn {rudder:+.0f}",
-        )
-        for rudder in (rudder_deg, -rudder_deg)
-    ]
-    blank = target.bare(TANKER)
-    samples = build_samples(
-        [*target.trials, *turns],
-        blank.table,
-        ship,
-        gear=gear,
-        shaft_speed=blank.service_shaft_speed,
-    )
-    return with_coefficients(blank, fit_all(get_method("ls").make, samples))
-
-
 def acceleration_correlations(target: Target, model: ShipModel) -> dict[str, float]:
     """Correlation of a grey box's accelerations with measured ones.
 
-    Pearson's, of means over windows.
-
-    Parameters
-    ----------
-    target : Target
-        Gives the trials.
-    model : ShipModel
-        A grey box of the target.
-
-    Returns
-    -------
-    dict of str to float
-        By equation.
+    Pearson's, of means over windows, by equation; `model` is a grey box of the target.
     """
     box, gear, shaft = model.table, model.steering, model.service_shaft_speed
     assert isinstance(box, GreyBox)
@@ -358,11 +260,3 @@ def heading_correlation(target: Target, fit: IdentificationResult) -> float:
     prediction = fit.predictions[SHOWN]
     assert prediction is not None
     return float(np.corrcoef(prediction["psi"], target.trial(SHOWN)["psi"])[0, 1])
-
-
-def off(run: Trial | None, truth: Trial, channel: str) -> float | None:
-    """Root mean square error of a channel, % of its span."""
-    if run is None:
-        return None
-    errors = run[channel] - truth[channel]
-    return float(100.0 * np.sqrt(np.mean(errors**2)) / np.ptp(truth[channel]))

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import groupby
 
 from rich.table import Table
 
 from agents.cli.tables import plain_table
 from papers import PAPERS, Row, get_paper
-from papers.row import COMPUTED, number
+from papers.row import number
 from shipgym.checks import check_choice
 
 ALL = "all"
-HEADINGS = ("case", "quantity", "printed", "{ours}", "agrees", "at best", "aim", "met")
-NUMBERS = ("printed", "{ours}", "at best")
+YES = {True: "yes", False: "no", None: ""}
 
 
 def papers_of(name: str) -> tuple[str, ...]:
@@ -29,28 +27,14 @@ def papers_of(name: str) -> tuple[str, ...]:
 
 
 def reproduce(
-    names: Iterable[str], tell: Callable[[str], None] | None = None
+    names: Iterable[str], tell: Callable[[str], None]
 ) -> dict[str, list[Row]]:
-    """Run the cases of papers again.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Short names of papers.
-    tell : callable, optional
-        Told of each row when it is done: paper, case and quantity.
-
-    Returns
-    -------
-    dict of str to list of Row
-    """
-    results: dict[str, list[Row]] = {}
-    for name in names:
-        results[name] = []
+    """Run the cases of papers again; `tell` is told of each row when it is done."""
+    results: dict[str, list[Row]] = {name: [] for name in names}
+    for name, rows in results.items():
         for row in get_paper(name).rows():
-            results[name].append(row)
-            if tell is not None:
-                tell(f"{name}: {row.case}, {row.quantity}")
+            rows.append(row)
+            tell(f"{name}: {row.name}")
     return results
 
 
@@ -65,20 +49,20 @@ def chosen(
         If no paper that was run has such a table or row; names the nearest.
     """
     rows = [row for of_paper in results.values() for row in of_paper]
-    if table is not None:
-        check_choice(table, dict.fromkeys(row.case for row in rows), "table")
-        rows = [row for row in rows if row.case == table]
-    if quantity is not None:
-        check_choice(quantity, dict.fromkeys(row.quantity for row in rows), "row")
-        rows = [row for row in rows if row.quantity == quantity]
-
-    kept = {id(row) for row in rows}
-    found = {}
-    for name, of_paper in results.items():
-        left = [row for row in of_paper if id(row) in kept]
-        if left:
-            found[name] = left
-    return found
+    for field, what, wanted in (
+        ("case", "table", table),
+        ("quantity", "row", quantity),
+    ):
+        if wanted is not None:
+            check_choice(
+                wanted, dict.fromkeys(getattr(row, field) for row in rows), what
+            )
+            rows = [row for row in rows if getattr(row, field) == wanted]
+    kept = {
+        name: [row for row in of_paper if row in rows]
+        for name, of_paper in results.items()
+    }
+    return {name: left for name, left in kept.items() if left}
 
 
 def missed(results: Mapping[str, Sequence[Row]]) -> list[str]:
@@ -93,32 +77,22 @@ def missed(results: Mapping[str, Sequence[Row]]) -> list[str]:
 
 def terminal_table(name: str, rows: Sequence[Row]) -> Table:
     """The rows of one paper for the terminal."""
-    paper = get_paper(name)
-    table = plain_table(paper.citation)
-    for heading in HEADINGS:
-        table.add_column(
-            heading.format(ours=paper.ours),
-            justify="right" if heading in NUMBERS else "left",
+    table = plain_table(get_paper(name).citation)
+    for heading in ("case", "quantity"):
+        table.add_column(heading)
+    for heading in ("printed", "as the paper", "agrees", "at best", "aim", "met"):
+        table.add_column(heading, justify="right")
+    above = ""
+    for row in rows:
+        table.add_row(
+            "" if row.case == above else row.case,
+            row.quantity,
+            number(row.printed),
+            number(row.as_paper),
+            YES[row.agrees],
+            number(row.best),
+            row.aim,
+            YES[row.met],
         )
-    for _, case in groupby(rows, lambda row: row.case):
-        for k, row in enumerate(case):
-            cells = _cells(row)
-            table.add_row(*(cells if k == 0 else ("", *cells[1:])))
+        above = row.case
     return table
-
-
-def _cells(row: Row) -> tuple[str, ...]:
-    yes = {True: "yes", False: "no", None: ""}
-    agrees = yes[row.agrees]
-    if agrees and row.basis != COMPUTED:
-        agrees = row.basis
-    return (
-        row.case,
-        row.quantity,
-        number(row.printed),
-        number(row.as_paper),
-        agrees,
-        number(row.best),
-        row.aim,
-        yes[row.met],
-    )

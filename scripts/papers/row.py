@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from shipgym.trials.trial import Trial
+
+MOTION = ("x", "y", "psi", "u", "v", "r", "delta")
 AGREEMENT = 0.1  # relative difference from print that still agrees
-#: What a row's number rests on: data; a truth that was put in and is read back, or an
-#: identity; a setting picked because it comes near print. The printed figure of a row
-#: that is `ELSEWHERE` is that of another row, which counts.
-COMPUTED, PUT_IN, PICKED = "computed", "put in", "picked"
-ELSEWHERE = "counted elsewhere"
 CONFIRMED, CONTRADICTED, NOT_TESTABLE = "confirmed", "contradicted", "not testable"
 
 
@@ -23,37 +21,24 @@ class Row:
 
     Attributes
     ----------
-    case : str
-        Table or figure of the paper.
-    quantity : str
-        What was printed, with its unit.
-    printed : float or None
-        The paper's number; None where it shows only a picture.
-    as_paper : float or None
-        Ours by the paper's method; None where its data or settings are not published.
-    best : float or None
-        Ours by the best method that there is here, on the same data.
+    case, quantity : str
+        Table or figure of the paper; what was printed, with its unit.
+    printed, as_paper, best : float or None
+        The paper's number, ours by its method, and ours by the best method here on the
+        same data. None: it shows only a picture; its data are not published.
     aim : str
         What `best` (or, for a failure to be shown again, `as_paper`) has to be.
     met : bool or None
         Whether it is; None where there is nothing to be met.
-    note : str
-        Why a row cannot be reproduced, a stand-in for data that are not published, or a
-        slip of the paper.
-    basis : str
-        What `as_paper` rests on: `computed`, `put in`, `picked` or `counted elsewhere`;
-        only what is computed can agree or not.
     """
 
     case: str
     quantity: str
     printed: float | None
     as_paper: float | None
-    best: float | None
+    best: float | None = None
     aim: str = ""
     met: bool | None = None
-    note: str = ""
-    basis: str = COMPUTED
 
     @property
     def agrees(self) -> bool | None:
@@ -65,21 +50,17 @@ class Row:
             return None
         mantissa, _, power = f"{self.printed:.4g}".partition("e")
         _, _, decimals = mantissa.partition(".")
-        last_digit = int(power or 0) - len(decimals)
-        hidden = 0.5 * 10.0**last_digit
-        tolerance = AGREEMENT * abs(self.printed)
+        hidden = 0.5 * 10.0 ** (int(power or 0) - len(decimals))
         difference = abs(self.as_paper - self.printed)
-        return difference <= max(tolerance, hidden)
+        return bool(difference <= max(AGREEMENT * abs(self.printed), hidden))
 
     @property
     def figure(self) -> object:
         """Subject of its aim: rows of the same number at best share one aim."""
         found = self.as_paper if self.best is None else self.best
-        return (
-            (self.quantity, found)
-            if found is None or float(found).is_integer()
-            else found
-        )
+        if found is None or float(found).is_integer():
+            return self.quantity, found
+        return found
 
     @property
     def name(self) -> str:
@@ -88,10 +69,30 @@ class Row:
 
     def to_dict(self) -> dict[str, Any]:
         """The row for JSON."""
-        agrees = None if self.agrees is None else bool(self.agrees)
-        met = None if self.met is None else bool(self.met)
-        fields = asdict(self) | {"met": met, "agrees": agrees}
-        return {key: _plain(value) for key, value in fields.items()}
+        fields = asdict(self) | {"agrees": self.agrees}
+        return {
+            key: value.item() if isinstance(value, np.generic) else value
+            for key, value in fields.items()
+        }
+
+
+def within(limit: float, best: float | None) -> tuple[str, bool]:
+    """An aim for the size of a number at best, and whether it is met."""
+    return f"within {limit:g}", best is not None and bool(abs(best) < limit)
+
+
+def sampled(
+    run: Trial, steps: int, name: str, channels: Iterable[str] = MOTION
+) -> Trial:
+    """Every n-th sample of a simulated trial, by default without its orders."""
+    kept = {channel: run[channel][::steps] for channel in channels}
+    return Trial(run.t[::steps], kept, name=name, kind=run.kind, length=run.length)
+
+
+def off(found: Trial, truth: Trial, channel: str) -> float:
+    """Root mean square error of a channel, % of its span."""
+    errors = found[channel] - truth[channel]
+    return float(100.0 * np.sqrt(np.mean(errors**2)) / np.ptp(truth[channel]))
 
 
 def number(value: float | None, digits: int = 4) -> str:
@@ -106,13 +107,8 @@ def aims(rows: Iterable[Row]) -> tuple[int, int]:
     met: dict[object, bool] = {}
     for row in rows:
         if row.met is not None:
-            met[row.figure] = met.get(row.figure, True) and bool(row.met)
+            met[row.figure] = met.get(row.figure, True) and row.met
     return sum(met.values()), len(met)
-
-
-def _plain(value: Any) -> Any:
-    """A number of Python for one of numpy."""
-    return value.item() if isinstance(value, np.generic) else value
 
 
 @dataclass(frozen=True)
@@ -145,10 +141,7 @@ class Conclusion:
     def verdict(self, rows: Sequence[Row]) -> str:
         """`confirmed`, `contradicted`, or `not testable`, as without the rows' data."""
         shown = self.rows(rows)
-        found = [
-            row for row in shown if row.as_paper is not None or row.best is not None
-        ]
-        if self.holds is None or len(found) < len(self.shown_by):
+        if self.holds is None or len(shown) < len(self.shown_by):
             return NOT_TESTABLE
         return CONFIRMED if self.holds(*shown) else CONTRADICTED
 
@@ -159,10 +152,8 @@ class Paper:
 
     Attributes
     ----------
-    name : str
-        Short name: the argument of `scripts/reproduce.py`.
-    citation : str
-        Authors, year, title.
+    name, citation : str
+        Short name: the argument of `scripts/reproduce.py`; authors, year, title.
     what : str
         One sentence: which cases, on which data.
     rows : callable
@@ -171,8 +162,6 @@ class Paper:
         Of the paper.
     differences : tuple of str
         Where print and recomputation differ, and why.
-    ours : str
-        Heading of the column `as_paper`.
     """
 
     name: str
@@ -181,4 +170,3 @@ class Paper:
     rows: Callable[[], Iterator[Row]]
     conclusions: tuple[Conclusion, ...] = ()
     differences: tuple[str, ...] = ()
-    ours: str = "as the paper"

@@ -9,10 +9,9 @@ sway and yaw alone come before the second step of surge.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,30 +78,19 @@ MIXED = (
 )  # r', drift
 MIXED_PERIOD = 20.0
 
-TOLERANCE, THRESHOLD = (
-    1e-5,
-    0.05,
-)  # of an elimination: held-out R2, relative standard error
+FINAL = (4, 7, 10)  # tables of the last step of each force
+#: Of an elimination: held-out R2, relative standard error.
+TOLERANCE, THRESHOLD = 1e-5, 0.05
 #: Of terms that say the same the paper keeps the one that its damping matrix (equation
 #: 42) multiplies by u.
 CUBIC = ("uuu", "uvv", "uuv", "urr", "uur", "rvu")
 
 
-@dataclass(frozen=True)
-class Step:
-    """One step of the reduction.
+class Step(NamedTuple):
+    """One step of the reduction: table, force, types of test.
 
-    Attributes
-    ----------
-    table : int
-        Of the paper.
-    force : str
-        X, Y or N.
-    kinds : tuple of str
-        Types of test.
-    printed : dict of str to tuple of (float, float or None)
-        By coefficient its standard error, %, in the old and in the revised model; None
-        where dropped.
+    `printed` has by coefficient its standard error, %, in the old and in the revised
+    model; None where dropped.
     """
 
     table: int
@@ -111,27 +99,18 @@ class Step:
     printed: Mapping[str, tuple[float, float | None]]
 
     @property
-    def terms(self) -> tuple[str, ...]:
-        """Of the old model."""
-        return tuple(self.printed)
-
-    @property
-    def kept(self) -> tuple[str, ...]:
-        """Of the revised model."""
-        return tuple(
-            name for name, (_, revised) in self.printed.items() if revised is not None
-        )
+    def kept(self) -> set[str]:
+        """Terms of the revised model."""
+        return {name for name, (_, new) in self.printed.items() if new is not None}
 
 
 def _step(table: int, force: str, kinds: str, printed: str) -> Step:
     """A step from its table: term, old and revised error, `-` where dropped."""
     words = printed.split()
-    triples = zip(words[::3], words[1::3], words[2::3], strict=True)
-    errors: dict[str, tuple[float, float | None]] = {}
-    for term, old, revised in triples:
-        is_dropped = revised == "-"
-        new_error = None if is_dropped else float(revised)
-        errors[f"{force}_{term}"] = (float(old), new_error)
+    errors = {
+        f"{force}_{term}": (float(old), None if new == "-" else float(new))
+        for term, old, new in zip(words[::3], words[1::3], words[2::3], strict=True)
+    }
     return Step(table, force, tuple(kinds.split()), errors)
 
 
@@ -222,27 +201,11 @@ def full_regression() -> ForceRegression:
     return force_regression([run for _, run in captive_tests()], PMM38, PARTICULARS)
 
 
-def truth(names: tuple[str, ...]) -> Floats:
-    """Coefficients of Table 11, 0 for those that it lacks."""
-    return np.array([TABLE_11.get(name, 0.0) for name in names])
-
-
-def noise_sizes() -> Floats:
-    """Standard deviations of noise of X, Y and N at `NOISE` 1, prime, shape (3,)."""
+def measured(noise: float = NOISE, seed: int = SEED) -> Floats:
+    """Forces with white noise in parts of their root mean squares, shape (n_rows,)."""
     regression = full_regression()
-    squares = [
-        np.mean(regression.targets[regression.equation == i] ** 2)
-        for i in range(len(FORCES))
-    ]
-    sizes: Floats = np.sqrt(np.array(squares))
-    return sizes
-
-
-def measured(sizes: Floats, seed: int = SEED) -> Floats:
-    """Forces with white noise of given deviations of X, Y and N, shape (n_rows,)."""
-    regression = full_regression()
-    noise = np.random.default_rng(seed).standard_normal(len(regression))
-    forces: Floats = regression.targets + sizes[regression.equation] * noise
+    errors = np.random.default_rng(seed).standard_normal(len(regression))
+    forces: Floats = regression.targets + noise * regression.scales() * errors
     return forces
 
 
@@ -266,7 +229,7 @@ def eliminate(
     forces: Floats,
     force: str,
     kinds: tuple[str, ...],
-    terms: tuple[str, ...],
+    terms: Iterable[str],
     known: Mapping[str, float],
 ) -> Reduction:
     """Leave-one-out of one force, the coefficients of others taken as known.
@@ -279,7 +242,7 @@ def eliminate(
         X, Y or N.
     kinds : tuple of str
         Types of test.
-    terms : tuple of str
+    terms : iterable of str
         To start from. What these tests do not excite is left out.
     known : dict of str to float
         Coefficients that X, Y and N share.
@@ -301,18 +264,16 @@ def eliminate(
     return backward_elimination(X, targets, excited, TOLERANCE, THRESHOLD, prefer)
 
 
-def step_by_step(forces: Floats) -> Iterator[tuple[Step, Reduction, dict[str, float]]]:
-    """Each step, its elimination and the coefficients known after it."""
+def step_by_step(forces: Floats) -> tuple[dict[int, Reduction], dict[str, float]]:
+    """The elimination of each step by table, and the coefficients that are left."""
+    reductions: dict[int, Reduction] = {}
     known: dict[str, float] = {}
     for step in STEPS:
-        found = eliminate(forces, step.force, step.kinds, step.terms, known)
+        found = eliminate(forces, step.force, step.kinds, step.printed, known)
         known |= found.coefficients
-        yield step, found, dict(known)
-
-
-def final_terms(reductions: Mapping[int, Reduction]) -> set[str]:
-    """Terms of the model that the steps lead to: those of Tables 4, 7 and 10."""
-    return {name for table in (4, 7, 10) for name in reductions[table].terms}
+        reductions[step.table] = found
+    final = {name for table in FINAL for name in reductions[table].terms}
+    return reductions, {name: known[name] for name in sorted(final)}
 
 
 def all_at_once(forces: Floats, known: Mapping[str, float]) -> set[str]:

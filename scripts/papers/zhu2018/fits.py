@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.tuned import TunedLSSVM
-from identification.samples.samples import Samples, build_samples
+from identification.samples.samples import build_samples
 from shipgym.models import ShipModel
 from shipgym.ships import Structure, get_structure
 from shipgym.ships.structures import own_structure
@@ -27,9 +26,6 @@ Floats = NDArray[np.float64]
 
 PREFIX = {"v": "b", "r": "c"}
 LEAST_C = 1e-2  # of the searches, as printed
-#: Upper bounds of the searches; not printed, but its degenerate objective drives C to
-#: them, so that the values printed lie just below.
-MOST_C = {"u": 5e7, "v": 1e10, "r": 20.0}
 RAN_AWAY = 1e3  # m/s or rad/s: beyond every physical range
 #: Optimiser and objective of the thesis' three methods.
 SEARCHES = {
@@ -58,28 +54,11 @@ WITH_SPEED = own_structure(
 )
 
 
-def every(trial: Trial, steps: int, name: str) -> Trial:
-    """Every n-th sample of a simulated trial."""
-    channels = {channel: values[::steps] for channel, values in trial.channels.items()}
-    return Trial(
-        trial.t[::steps], channels, name=name, kind=trial.kind, length=trial.length
-    )
-
-
-def first_samples(trial: Trial, count: int) -> Trial:
-    """The beginning of a trial."""
-    channels = {channel: values[:count] for channel, values in trial.channels.items()}
-    return Trial(
-        trial.t[:count], channels, name=trial.name, kind=trial.kind, length=trial.length
-    )
-
-
-def search(method: str, equation: str, most: float | None = None) -> TunedLSSVM:
+def search(method: str, most: float) -> TunedLSSVM:
     """LS-SVR on columns as they are, with C found by a method of the thesis."""
     optimiser, objective = SEARCHES[method]
-    bounds = (LEAST_C, MOST_C[equation] if most is None else most)
     return TunedLSSVM(
-        optimiser=optimiser, objective=objective, bounds=bounds, scale=False
+        optimiser=optimiser, objective=objective, bounds=(LEAST_C, most), scale=False
     )
 
 
@@ -87,15 +66,7 @@ def steering_terms(trial: Trial) -> Floats:
     """The seven terms of equation 7.1, SI units, shape (n_samples, 7)."""
     v = trial["v"]
     r = trial["r"]
-    terms = [
-        v,
-        np.abs(v) * v,
-        np.abs(r) * v,
-        r,
-        np.abs(v) * r,
-        np.abs(r) * r,
-        trial["delta"],
-    ]
+    terms = [v, abs(v) * v, abs(r) * v, r, abs(v) * r, abs(r) * r, trial["delta"]]
     return np.column_stack(terms)
 
 
@@ -155,7 +126,8 @@ def steering_fit(
     structure : Structure
         `steering7`, or one with some of its terms.
     change : bool
-        Whether x(k+1) - x(k) is the target, and not x(k+1).
+        Whether x(k+1) - x(k) is the target, and not x(k+1), as for the reduced models,
+        some of which have no linear term that could carry the state on.
 
     Returns
     -------
@@ -203,12 +175,6 @@ def mean_square(
     return float(unit**2 * np.mean(error**2))
 
 
-@lru_cache(maxsize=2)
-def spline_samples(trial: Trial, ship: ShipModel) -> Samples:
-    """Spline samples of all terms of `WITH_SPEED`."""
-    return build_samples([trial], WITH_SPEED, ship.particulars, gear=ship.steering)
-
-
 def spline_fit(
     trial: Trial, ship: ShipModel, columns: Mapping[str, Sequence[int]]
 ) -> ShipModel:
@@ -236,7 +202,7 @@ def spline_fit(
         dynamics=WITH_SPEED,
         service_shaft_speed=ship.service_shaft_speed,
     )
-    samples = spline_samples(trial, ship)
+    samples = build_samples([trial], WITH_SPEED, ship.particulars, gear=ship.steering)
     accelerations = {
         q: np.zeros(len(WITH_SPEED.terms(q))) for q in WITH_SPEED.regressed
     }

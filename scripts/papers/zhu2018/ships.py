@@ -15,7 +15,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from papers.zhu2018.fits import every
+from papers.row import sampled
 from shipgym.manoeuvres import zigzag
 from shipgym.models import ShipModel
 from shipgym.models.catalogue import container
@@ -35,23 +35,21 @@ ORDERS = {
 
 
 @cache
-def ship(rudder_limit_deg: float = 35.0) -> ShipModel:
+def ship() -> ShipModel:
     """The container ship at the thesis' speed."""
     reference = container()
     return replace(
         reference,
         particulars=replace(reference.particulars, speed=SPEED),
-        steering=replace(reference.steering, rudder_limit_deg=rudder_limit_deg),
+        steering=replace(reference.steering, rudder_limit_deg=35.0),
     )
 
 
 @cache
-def zigzag_trial(
-    angle_deg: float, rudder_limit_deg: float = 35.0, by_euler: bool = False
-) -> Trial:
+def zigzag_trial(angle_deg: float, by_euler: bool = False) -> Trial:
     """A zigzag as sampled, of the ship integrated accurately or by Euler's rule."""
     name = f"zigzag {angle_deg:g}/{angle_deg:g}"
-    model = ship(rudder_limit_deg)
+    model = ship()
     if by_euler:
         helm = Helm(np.radians(angle_deg), model)
         return euler_trial(model, helm.order, name, "zigzag")
@@ -59,7 +57,7 @@ def zigzag_trial(
     trial = zigzag(
         model, angle_deg, angle_deg, duration=DURATION, dt=STEP, switch="step"
     )
-    return every(trial, round(INTERVAL / STEP), name)
+    return sampled(trial, round(INTERVAL / STEP), name, trial.channels)
 
 
 @cache
@@ -74,7 +72,8 @@ def straight_line(use: str, by_euler: bool = False) -> Trial:
         return euler_trial(ship(), lambda k, _: np.array([0.0, held[k]]), name)
 
     commands = np.column_stack([np.zeros_like(shaft), shaft])
-    return every(ship().simulate(commands, STEP), round(INTERVAL / STEP), name)
+    run = ship().simulate(commands, STEP)
+    return sampled(run, round(INTERVAL / STEP), name, run.channels)
 
 
 class Helm:
