@@ -7,7 +7,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 import zipfile
 from pathlib import Path
 from random import Random
@@ -16,7 +15,6 @@ import numpy as np
 import openpyxl
 import pytest
 from fuzzing import reading
-from fuzzing.mutations import mutate
 from fuzzing.reading import Kind, run_kind
 
 from shipgym.errors import InputError
@@ -66,18 +64,15 @@ def test_a_reader_that_does_not_check_is_found(corpus):
     ("harm", "told"),
     [
         (endless, "HangError"),
-        (lambda: any(iter(int, 1)), "process died with -9"),
-        (lambda: time.sleep(60.0), "HangError"),
         (lambda: bytes(2**31), "MemoryError"),
         (lambda: os._exit(7), "process died with 7"),
     ],
-    ids=["endless", "compiled", "asleep", "large", "dead"],
+    ids=["endless", "large", "dead"],
 )
 def test_a_hang_a_bomb_and_the_death_of_the_process_are_found(
     harm, told, corpus, monkeypatch
 ):
     monkeypatch.setattr(reading, "LONGEST_S", 0.2)
-    monkeypatch.setattr(reading, "LONGEST_WAIT_S", 0.5)
     report = run_kind(Kind("planted", lambda path: when(path, harm)), 12, 0)
     assert any(
         told in what or told in one.message for what, one in report.faults.items()
@@ -90,19 +85,6 @@ def test_a_refusal_must_be_fit_to_print(corpus):
 
     report = run_kind(Kind("planted", lambda path: when(path, refuse)), 40, 0)
     assert any("cannot be printed" in what for what in report.faults)
-
-
-@pytest.mark.parametrize(
-    "name", ["a.json", "a.toml", "a.csv", "a.safetensors", "a.bin"]
-)
-def test_a_change_is_a_function_of_what_it_is_drawn_from(name):
-    corpus = ROOT / "tests" / "corpus"
-    files = [path for path in sorted(corpus.rglob("*")) if path.is_file()]
-    seeds = {path.suffix: path.read_bytes() for path in files}
-    content = seeds.get(Path(name).suffix, b"some bytes")
-    changed = {mutate(Random(k), name, content) for k in range(100)}
-    assert len(changed) > 50
-    assert all(mutate(Random(k), name, content) in changed for k in range(100))
 
 
 def test_every_kind_of_file_is_read_or_refused():

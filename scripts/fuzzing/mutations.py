@@ -23,20 +23,9 @@ TEXTS = (
     *("1e999", "1", "true", "None", "٣", "1,5", "mariner", "lq", "auto", "calm"),
     *("prime", "2026-01-01T00:00:00Z", "=1+1", "a.b", "#", ";", ",", "1.5.2", "0,5"),
 )
-INSERTED = (
-    *(
-        b"\0",
-        b"\xff",
-        b"\xff\xfe",
-        b"\xef\xbb\xbf",
-        b"\n",
-        b"\r",
-        b'"',
-        b"{",
-        b"[",
-        b"}",
-    ),
-    *(b",", b"\xed\xa0\x80", b"#", b" " * 100, b"9" * 400, b"\\", b"=", b"e"),
+#: Bytes put in: controls, broken and wide characters, signs of the formats.
+INSERTED = b'\0 \xff \xff\xfe \xef\xbb\xbf \n \r " { [ } , \xed\xa0\x80 # \\ = e'.split(
+    b" "
 )
 WHOLE = (
     *(b"", b"\0", b"null", b"[]", b"{}", b"1", b"\xef\xbb\xbf", b"\xff\xfea\0", b"nan"),
@@ -44,6 +33,7 @@ WHOLE = (
     *(b"," * 50_000, b"a,b\n" * 20_000, b"PAR1PAR1", b"\x80\x04N.", b"PK\x03\x04"),
 )
 ENCODINGS = ("utf-16", "utf-8-sig", "utf-32", "cp037")
+FACTORS = (-1, 0, 2, 0.5, 10, 1e3, 1e-3, 1e-6, 1e12, 1e150)
 
 
 def mutate(random: Random, name: str, content: bytes) -> bytes:
@@ -59,24 +49,28 @@ def mutate(random: Random, name: str, content: bytes) -> bytes:
 
 
 def spoilt(random: Random, content: bytes) -> bytes:
-    """Bytes cut off, flipped, put in, dropped, doubled; seldom another file."""
-    n = len(content)
-    start = random.randrange(n + 1)
-    end = min(n, start + random.randrange(1, 40))
-    piece = content[start:end]
-    bit = bytes([content[start] ^ (1 << random.randrange(8))]) if start < n else b""
-    digit = str(random.randrange(10)).encode()
+    """Bytes flipped, put in, dropped or doubled; cut off; seldom another file."""
+    start = random.randrange(len(content) + 1)
+    head, piece, tail = (
+        content[:start],
+        content[start : start + 40],
+        content[start + 40 :],
+    )
+    flipped = bytes(byte ^ (1 << random.randrange(8)) for byte in piece[:1])
     middle = random.choice(
-        (bit, bit, random.choice(INSERTED) + piece, b"", piece * 2, piece * 30, digit)
+        (
+            flipped + piece[1:],
+            random.choice(INSERTED) + piece,
+            b"",
+            piece * 2,
+            piece * 30,
+        )
     )
-    rest = content[start + 1 :] if middle in (bit, digit) else content[end:]
-    return random.choice(
-        (*(content[:start] + middle + rest,) * 7, content[:start], random.choice(WHOLE))
-    )
+    return random.choice((*(head + middle + tail,) * 7, head, random.choice(WHOLE)))
 
 
 def value(random: Random) -> Any:
-    """A number, a text, another scalar, or a small, a long or a deep list or table."""
+    """A number, a text, another scalar, or a list or table, small, long or deep."""
     scalar = random.choice(
         (random.choice(NUMBERS), random.choice(TEXTS), None, True, False)
     )
@@ -84,70 +78,40 @@ def value(random: Random) -> Any:
         return scalar
     deep: Any = scalar
     for _ in range(random.choice((1, 2, 5, 20, 50))):
-        deep = [deep] if random.random() < 0.5 else {"a": deep}
-    return random.choice(
-        ([scalar] * 2, {"a": scalar}, [0.5] * random.choice((10, 1000)), deep)
-    )
+        deep = random.choice(([deep], {"a": deep}))
+    return random.choice(([scalar] * 2, [0.5] * random.choice((10, 1000)), deep))
 
 
-def nested_changed(random: Random, root: Any) -> Any:
+def changed(random: Random, root: Any) -> Any:
     """Nested values with one place changed; the rest is shared."""
-    if not isinstance(root, dict | list) or not root:
-        return scaled(random, root) if random.random() < 0.6 else value(random)
-    if isinstance(root, dict):
-        name = random.choice(list(root))
-        if random.random() < 0.8:
-            return root | {name: nested_changed(random, root[name])}
-        return in_table(random, root, name)
-    place = random.randrange(len(root))
-    if random.random() < 0.8:
-        return [*root[:place], nested_changed(random, root[place]), *root[place + 1 :]]
-    return in_list(random, root, place)
-
-
-def in_table(random: Random, root: dict[str, Any], key: str) -> dict[str, Any]:
-    """A table with an entry dropped, renamed, added, replaced, scaled or emptied."""
-    others = {name: one for name, one in root.items() if name != key}
-    names = (key.upper(), key + "s", random.choice(TEXTS), random.choice(list(root)))
+    if not isinstance(root, dict | list):
+        number = isinstance(root, int | float) and random.random() < 0.6
+        return root * random.choice(FACTORS) if number else value(random)
+    if not root or random.random() < 0.1:
+        return value(random)
+    if isinstance(root, list):
+        k = random.randrange(len(root))
+        inner = changed(random, root[k])
+        piece = random.choice(
+            (*([inner],) * 6, [], [value(random), root[k]], [root[k]] * 1000)
+        )
+        return root[:k] + piece + root[k + 1 :]
+    name = random.choice(list(root))
+    rest = {key: one for key, one in root.items() if key != name}
+    other = random.choice((name.upper(), name + "s", *TEXTS, *root))
     return random.choice(
         (
-            others,
-            others | {random.choice(names): root[key]},
-            root | {random.choice(TEXTS): value(random)},
-            root | {key: value(random)},
-            root | {key: scaled(random, root[key])},
-            root | {key: type(root[key])() if root[key] else None},
+            *(root | {name: changed(random, root[name])},) * 8,
+            rest,
+            rest | {other: root[name]},
+            root | {other: value(random)},
         )
     )
-
-
-def in_list(random: Random, root: list[Any], key: int) -> list[Any]:
-    """A list with an entry dropped, added, replaced, repeated, or in another order."""
-    before, after = root[:key], root[key + 1 :]
-    return random.choice(
-        (
-            before + after,
-            [*before, value(random), *root[key:]],
-            [*before, value(random), *after],
-            [*before, scaled(random, root[key]), *after],
-            [*before, *[root[key]] * random.choice((2, 20, 1000)), *after],
-            root[::-1],
-        )
-    )
-
-
-def scaled(random: Random, one: Any) -> Any:
-    """Another number in the place of one, near it or far; another type of the rest."""
-    if isinstance(one, bool) or not isinstance(one, int | float):
-        return random.choice(
-            ([one], {"a": one}, str(one)[:200], random.choice(NUMBERS))
-        )
-    return one * random.choice((-1, 0, 2, 0.5, 10, 1e3, 1e-3, 1e-6, 1e12, 1e150))
 
 
 def json_changed(random: Random, content: bytes) -> bytes:
     """A place in JSON, or a key twice."""
-    text = json.dumps(nested_changed(random, json.loads(content)))
+    text = json.dumps(changed(random, json.loads(content)))
     if random.random() < 0.05:
         text = text.replace('{"', '{"a": 1, "a": 2, "', 1)
     return text.encode()
@@ -155,9 +119,7 @@ def json_changed(random: Random, content: bytes) -> bytes:
 
 def toml_changed(random: Random, content: bytes) -> bytes:
     """A place in TOML."""
-    root = nested_changed(random, parse_toml(content.decode(), "seed:"))
-    if not isinstance(root, dict):
-        return toml(root).encode("utf-8", "surrogatepass")
+    root = changed(random, parse_toml(content.decode(), "seed:"))
     lines = [f"{json.dumps(key)} = {toml(one)}\n" for key, one in root.items()]
     return "".join(lines).encode("utf-8", "surrogatepass")
 
@@ -175,54 +137,61 @@ def toml(one: Any) -> str:
 
 
 def csv_changed(random: Random, content: bytes) -> bytes:
-    """A cell, a row, a column, the delimiter, quotes, line ends or the encoding."""
+    """A cell, a row, a column, or the delimiter, quotes, line ends or the encoding."""
     text = content.decode()
     delimiter = ";" if ";" in text.partition("\n")[0] else ","
+    if random.random() < 0.25:
+        return reworded(random, text, delimiter)
     rows = [line.split(delimiter) for line in text.split("\n")]
     k = random.randrange(len(rows))
     column = random.randrange(len(rows[0]))
     cell = str(random.choice(NUMBERS + TEXTS))
-    what = random.choice(("cell",) * 6 + ("row",) * 3 + ("column",) * 3 + ("text",) * 4)
+    what = random.choice(("cell", "cell", "row", "column"))
     if what == "cell":
-        rows[k][random.randrange(len(rows[k]))] = cell
+        rows[k][column : column + 1] = [cell]
     elif what == "row":
-        rows[k : k + 1] = random.choice(
-            ([], [rows[k]] * 2, [[*rows[k], cell]], [rows[k][:-1]])
-        )
-    elif what == "column":
-        new = random.choice((None, cell, rows[k][0]))
+        rows[k : k + 1] = random.choice(([], [rows[k]] * 2, [[*rows[k], cell]]))
+    else:
+        new = random.choice(([], [cell], [rows[k][0]]))
         for row in rows[random.randrange(2) :]:
-            row[column : column + 1] = [] if new is None else [new]
+            row[column : column + 1] = new
     joined = "\n".join(delimiter.join(row) for row in rows)
-    if what != "text":
-        return joined.encode("utf-8", "surrogatepass")
+    return joined.encode("utf-8", "surrogatepass")
+
+
+def reworded(random: Random, text: str, delimiter: str) -> bytes:
+    """The same table in another dialect or encoding, or with a stray quote."""
     place = random.randrange(len(text))
-    quoted = text[:place] + random.choice(('"', '""', "'", '"\n')) + text[place:]
-    other = text.replace(delimiter, random.choice(";,\t| "))
-    commas = text.replace(".", ",")
-    ends = text.replace("\n", random.choice(("\r\n", "\r", "\n\n", "\u2028")))
-    changed = random.choice((quoted, quoted, other, commas, ends, text))
-    return changed.encode(random.choice(ENCODINGS) if changed == text else "utf-8")
+    quote = random.choice(('"', '""', "'", '"\n'))
+    dialects = (
+        text[:place] + quote + text[place:],
+        text.replace(delimiter, random.choice(";,\t| ")),
+        text.replace(".", ","),
+        text.replace("\n", random.choice(("\r\n", "\r", "\n\n", "\u2028"))),
+    )
+    if random.random() < 0.2:
+        return text.encode(random.choice(ENCODINGS))
+    return random.choice(dialects).encode()
 
 
 def safetensors_changed(random: Random, content: bytes) -> bytes:
-    """Its header's length, an entry of the header, its data, or a number of them."""
+    """Its header's length, an entry of the header, or its data."""
     (length,) = struct.unpack("<Q", content[:8])
     text, data = content[8 : 8 + length], content[8 + length :]
-    what = random.randrange(6)
+    what = random.randrange(5)
     if what == 0:
-        wrong = random.choice((0, 1, length + 1, 2**31, 2**63, 2**64 - 1, 100_000_000))
-        return struct.pack("<Q", wrong) + content[8:]
-    if what == 1:
+        length = random.choice((0, 1, length + 1, 2**31, 2**63, 2**64 - 1))
+    elif what == 1:
         place = random.randrange(0, len(data), 4)
         bits = struct.pack("<I", random.choice((0x7FC00000, 0x7F800000, 1)))
-        return content[: 8 + length + place] + bits + data[place + 4 :]
-    if what == 2:
+        data = data[:place] + bits + data[place + 4 :]
+    elif what == 2:
         data = data[: random.randrange(len(data))] + b"\0" * random.choice((0, 4, 1000))
     else:
-        text = json.dumps(nested_changed(random, json.loads(text))).encode()
+        text = json.dumps(changed(random, json.loads(text))).encode()
         text += b" " * (-len(text) % 8)
-    return struct.pack("<Q", len(text)) + text + data
+        length = len(text)
+    return struct.pack("<Q", length) + text + data
 
 
 CHANGES: dict[str, Callable[[Random, bytes], bytes]] = {

@@ -45,8 +45,6 @@ class Kind:
         What is done with what was read, briefly.
     main : str
         File of a folder whose path is given to the reader.
-    prepare : callable, optional
-        Writes the seeds to a folder instead, where the corpus cannot hold them.
     slow : int
         An input costs so many times what others do: so many fewer of them are read.
     """
@@ -55,7 +53,6 @@ class Kind:
     read: Callable[[Path], Any]
     use: Callable[[Any], object] | None = None
     main: str = ""
-    prepare: Callable[[Path], None] | None = None
     slow: int = 1
 
 
@@ -135,13 +132,16 @@ def _count(report: Report, outcome: str | tuple[str, Fault]) -> None:
 
 def _read_all(kind: Kind, first: int, last: int, seed: int, told: Connection) -> None:
     """Read inputs by number and tell what came of each."""
-    with tempfile.TemporaryDirectory() as name, _guarded():
+    with tempfile.TemporaryDirectory() as name:
+        signal.signal(signal.SIGPROF, _stop)
+        signal.signal(signal.SIGALRM, _stop)
         folder = Path(name)
-        seeds = list(_seeds(kind, folder / "prepared"))
+        seeds = list(_seeds(kind))
         for one in seeds:  # must do as it is; what is imported then is not counted
             if error := _outcome(kind, _written(one, {}, folder / "first")):
                 raise error
-        limit = _status("VmSize") + MOST_MEMORY
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+        limit = pages * resource.getpagesize() + MOST_MEMORY
         resource.setrlimit(resource.RLIMIT_AS, (limit, resource.RLIM_INFINITY))
         for index in range(first, last):
             random = Random(f"{seed} {kind.name} {index}")
@@ -197,14 +197,9 @@ def _site(error: BaseException) -> str:
     return f"{type(error).__name__} in {frame.filename}:{frame.lineno} {frame.name}"
 
 
-def _seeds(kind: Kind, prepared: Path) -> Iterator[Seed]:
+def _seeds(kind: Kind) -> Iterator[Seed]:
     """The seeds of a kind: files, and folders of files."""
-    source = CORPUS / kind.name
-    if kind.prepare is not None:
-        prepared.mkdir(exist_ok=True)
-        kind.prepare(prepared)
-        source = prepared
-    for entry in sorted(source.iterdir()):
+    for entry in sorted((CORPUS / kind.name).iterdir()):
         if entry.is_file():
             yield Seed(entry.name, {entry.name: entry.read_bytes()})
             continue
@@ -239,27 +234,15 @@ def _written(one: Seed, changed: dict[str, bytes], folder: Path) -> Path:
     return folder / one.main
 
 
-@contextmanager
-def _guarded() -> Iterator[None]:
-    """Signals of both clocks raise `HangError`."""
-
-    def stop(number: int, frame: Any) -> None:
-        raise HangError(
-            f"more than {LONGEST_S} s of processor, or waits for {LONGEST_WAIT_S} s"
-        )
-
-    numbers = (signal.SIGPROF, signal.SIGALRM)
-    before = [(number, signal.signal(number, stop)) for number in numbers]
-    try:
-        yield
-    finally:
-        for number, handler in before:
-            signal.signal(number, handler)
+def _stop(number: int, frame: Any) -> None:
+    raise HangError(
+        f"more than {LONGEST_S} s of processor, or waits for {LONGEST_WAIT_S} s"
+    )
 
 
 @contextmanager
 def _limited() -> Iterator[None]:
-    """Both clocks are set within the block."""
+    """Both clocks are set within the block and raise `HangError`."""
     signal.setitimer(signal.ITIMER_PROF, LONGEST_S)
     signal.setitimer(signal.ITIMER_REAL, LONGEST_WAIT_S)
     try:
@@ -268,11 +251,3 @@ def _limited() -> Iterator[None]:
         for clock in (signal.ITIMER_PROF, signal.ITIMER_REAL, signal.ITIMER_PROF):
             with suppress(HangError):  # of the other clock, at this moment
                 signal.setitimer(clock, 0.0)
-
-
-def _status(name: str) -> int:
-    """A size of this process, bytes."""
-    for line in Path("/proc/self/status").read_text().splitlines():
-        if line.startswith(f"{name}:"):
-            return 1024 * int(line.split()[1])
-    return 0

@@ -222,8 +222,13 @@ def summary_rows() -> Iterator[Row]:
         }
         found = errors(as_printed(samples))
         for what, measure in MEASURES.items():
-            values = map(measure, (printed, found, errors(at_best())))
-            yield Row("Section 4", f"{structure}: {what}", *values)
+            yield Row(
+                "Section 4",
+                f"{structure}: {what}",
+                measure(printed),
+                measure(found),
+                measure(errors(at_best())),
+            )
         ranks = spearmanr([effects[name] for name in found], list(found.values()))
         yield Row("Section 4", f"{structure}: {RANKS}", None, float(ranks.statistic))
 

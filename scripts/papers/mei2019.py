@@ -62,6 +62,7 @@ WITHIN_MEASURED = {
     "tactical": 4.0,
 }  # what the paper reaches at +35, rounded, %
 
+NO_AIM: tuple[str, None] = ("", None)
 BARE = ", bare reference"
 VIRTUAL = "Tables 6, 7: MMG model as target"
 
@@ -131,7 +132,7 @@ def virtual_rows() -> Iterator[Row]:
                     printed if is_printed else None,
                     theirs,
                     best,
-                    *(() if kind else within(WITHIN, best)),
+                    *(NO_AIM if kind else within(WITHIN, best)),
                 )
         found_tanker = target.turn(our_way(target, TANKER).model, rudder)
         for index, words in WORDS.items():
@@ -157,19 +158,22 @@ def figure_rows(target: Target) -> Iterator[Row]:
             "Figure 5: MARIN",
             f"correlation of {word} accelerations, reference and target",
             correlation,
-            *(found[q] for found in accelerations),
+            accelerations[0][q],
+            accelerations[1][q],
         )
         yield Row(
             "Figure 6: MARIN",
             f"insensitive band of {word}",
             band,
-            *(search[q]["epsilon"] for search in searches),
+            searches[0][q]["epsilon"],
+            searches[1][q]["epsilon"],
         )
     yield Row(
         "Figure 6: MARIN",
         "correlation of headings, 20/20 zigzag",
         0.993,
-        *(heading_correlation(target, fit) for fit in fits),
+        heading_correlation(target, fits[0]),
+        heading_correlation(target, fits[1]),
     )
 
 

@@ -142,22 +142,22 @@ class Target:
             reference, self.ship.particulars, self.ship.steering, shaft
         )
 
-    def turn(self, model: ShipModel, rudder_deg: float) -> dict[str, float]:
+    def turn(self, model: ShipModel, rudder_deg: float) -> dict[str, Any]:
         """Advance and tactical diameter of a turning circle, lengths."""
         dt = 0.01 * self.travel
         run = turning_circle(model, rudder_deg, duration=TURN * self.travel, dt=dt)
         found = turning_indices(run, self.ship.particulars.length)
         lengths = found.advance_lengths, found.tactical_diameter_lengths
-        return dict(zip(("advance", "tactical"), map(float, lengths), strict=True))
+        return {"advance": lengths[0], "tactical": lengths[1]}
 
-    def overshoots(self, model: ShipModel) -> dict[str, float]:
+    def overshoots(self, model: ShipModel) -> dict[str, Any]:
         """First and second overshoot of a 20/20 zigzag to starboard, degrees."""
         dt = 0.01 * self.travel
         run = zigzag(model, 20, 20, duration=ZIGZAG * self.travel, dt=dt)
         found = zigzag_indices(run, self.ship.particulars.length)
         angles = {"overshoot_1": found.overshoot_1_deg}
         angles["overshoot_2"] = found.overshoot_2_deg
-        return {name: float(angle) for name, angle in angles.items()}
+        return angles
 
 
 @cache

@@ -400,9 +400,11 @@ def _even_column(table: LogTable, free: list[str]) -> ColumnGuess | None:
     numbers_of_rows = ("", "index", "row", "no", "nr", "id", "seq", "sample")
     for column in free:
         values = table.likely_numbers(column, sided=True)
-        if values is None or values.size < 10:
+        if values is None:
             continue
         values = values[np.isfinite(values)]
+        if values.size < 10:
+            continue
         steps = np.diff(values)
         is_even = np.all(steps > 0.0) and np.ptp(steps) <= 0.01 * steps.max()
         is_count = values[0] in (0.0, 1.0) and np.all(steps == 1.0)
