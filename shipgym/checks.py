@@ -6,27 +6,16 @@ import reprlib
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from numbers import Integral, Real
+from operator import ge, gt, le, lt
 from pathlib import Path
-from types import NoneType
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.errors import InputError
 
-#: Types of a JSON value; a list of what all entries are, or of what each of several is;
-#: a table by key, or by `ANY_KEY` what all values are.
-Shape: TypeAlias = "tuple[type, ...] | list[Shape] | dict[str, Shape]"
-ANY_KEY = "*"
-_WORDS = {
-    str: "a string",
-    int: "an integer",
-    float: "a number",
-    bool: "a boolean",
-    NoneType: "null",
-}
-
+_COMPARED = {">": gt, ">=": ge, "<": lt, "<=": le}
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 200
 
@@ -197,49 +186,30 @@ def check_number(
     place, such as ``"ship.toml: [ship] length"``, and says what is expected, explained
     by `hint`, such as ``"in m"``, and what the value is.
     """
+    bounds = {">": above, ">=": at_least, "<": below, "<=": at_most}
+    stated = {sign: bound for sign, bound in bounds.items() if bound is not None}
     number = _as_float(value)
-    within = (
-        math.isfinite(number)
-        and (above is None or number > above)
-        and (at_least is None or number >= at_least)
-        and (below is None or number < below)
-        and (at_most is None or number <= at_most)
-    )
-    if not within:
-        bounds = {">": above, ">=": at_least, "<": below, "<=": at_most}
-        raise _no_such_number(value, where, bounds, hint)
-    return number
+    if math.isfinite(number) and all(
+        _COMPARED[sign](number, bound) for sign, bound in stated.items()
+    ):
+        return number
 
-
-def _no_such_number(
-    value: Any,
-    where: str,
-    bounds: Mapping[str, float | None],
-    hint: str,
-) -> InputError:
-    stated = []
-    for sign, bound in bounds.items():
-        if bound is not None:
-            stated.append(f"{sign} {bound:g}")
-    expected = f"a number {' and '.join(stated)}".rstrip()
+    limits = " and ".join(f"{sign} {bound:g}" for sign, bound in stated.items())
+    expected = f"a number {limits}".rstrip()
     if hint:
         expected += f" ({hint})"
-    if isinstance(value, str):
-        remedy = "write the number without quotes"
-        return unexpected(where, expected, value, remedy)
-    if isinstance(value, bool) or not isinstance(value, Real):
-        return unexpected(where, expected, value)
-    return InputError(f"{where}: expected {expected}, got {_as_float(value):g}")
+    remedy = "write the number without quotes" if isinstance(value, str) else ""
+    raise unexpected(where, expected, value, remedy)
 
 
 def _as_float(value: Any) -> float:
-    """Convert to float: infinite where too large, nan for anything but a number."""
+    """Convert to float: nan for what is no number, or too large a one."""
     if isinstance(value, bool) or not isinstance(value, Real):
         return math.nan
     try:
         return float(value)
     except OverflowError:
-        return math.inf
+        return math.nan
 
 
 def check_whole(
@@ -296,66 +266,19 @@ def check_array(
 ) -> NDArray[np.float64]:
     """Return the numbers of nested lists as an array of a shape; None is any length.
 
-    Strings, booleans, numbers that are not finite and rows that differ in length are
-    refused.
+    Anything but finite numbers, and rows that differ in length, are refused.
     """
-    size, *row_shape = shape
-    if not isinstance(value, list) or size not in (None, len(value)):
-        count = "" if size is None else f"{size} "
-        kind = "lists" if row_shape else "numbers"
-        found = f"{len(value)} entries" if isinstance(value, list) else shown(value)
-        raise InputError(f"{where}: expected a list of {count}{kind}, got {found}")
-    if not row_shape:
-        return _check_numbers(value, where)
-
-    has_lists = bool(value) and isinstance(value[0], list)
-    if row_shape[0] is None and has_lists:
-        row_shape[0] = len(value[0])  # all rows are as long as the first
-    rows = []
-    for i, row in enumerate(value):
-        rows.append(check_array(row, tuple(row_shape), f"{where}[{i}]"))
-    return np.array(rows)
-
-
-def _check_numbers(values: list[Any], where: str) -> NDArray[np.float64]:
-    for i, number in enumerate(values):
-        if isinstance(number, bool) or not isinstance(number, int | float):
-            raise unexpected(f"{where}[{i}]", "a number", number)
-    return check_finite(values, where)
-
-
-def check_shape(value: Any, shape: Shape, where: str) -> None:
-    """Refuse nested JSON values that differ from a shape; further keys are allowed."""
-    if isinstance(shape, dict):
-        _check_table_shape(value, shape, where)
-    elif isinstance(shape, list):
-        _check_list_shape(value, shape, where)
-    elif type(value) not in shape:
-        words = []
-        for kind in shape:
-            word = _WORDS.get(kind, kind.__name__)
-            words.append(word)
-        expected = " or ".join(dict.fromkeys(words))
-        raise unexpected(where, expected, value)
-
-
-def _check_table_shape(value: Any, shape: dict[str, Shape], where: str) -> None:
-    table = check_table(value, where)
-    keys = table if ANY_KEY in shape else shape
-    for key in keys:
-        if key not in table:
-            raise InputError(f"{where}: '{key}' is missing; give {quoted(shape)}")
-        expected = shape[key] if key in shape else shape[ANY_KEY]
-        check_shape(table[key], expected, f"{where}.{key}")
-
-
-def _check_list_shape(value: Any, shape: list[Shape], where: str) -> None:
-    if not isinstance(value, list):
-        raise unexpected(where, "a list", value)
-    shapes = shape
-    if len(shape) == 1:
-        shapes = shape * len(value)
-    elif len(value) != len(shape):
-        raise unexpected(where, f"a list of {len(shape)}", value)
-    for i, (entry, entry_shape) in enumerate(zip(value, shapes, strict=True)):
-        check_shape(entry, entry_shape, f"{where}[{i}]")
+    try:
+        array = np.array(value)
+    except ValueError:  # rows that differ in length
+        array = np.array(None)
+    if array.size == 0 and None in shape:
+        return np.zeros([length or 0 for length in shape])
+    fits = array.ndim == len(shape) and array.dtype.kind in "fiu"
+    if fits:
+        sizes = zip(shape, array.shape, strict=True)
+        fits = all(length in (None, size) for length, size in sizes)
+    if not fits:
+        lengths = " x ".join("any" if one is None else str(one) for one in shape)
+        raise unexpected(where, f"a list of numbers, {lengths}", value)
+    return check_finite(array, where)

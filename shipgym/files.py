@@ -10,17 +10,15 @@ import os
 import re
 import stat
 import tomllib
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from shipgym.checks import check_table, did_you_mean, shown, unexpected
+from shipgym.checks import check_table, did_you_mean, unexpected
 from shipgym.drafts import atomic_path
 from shipgym.errors import InputError
 
@@ -113,19 +111,14 @@ def read_bytes(path: Path, what: str, largest: int) -> bytes:
 @contextmanager
 def _opened(path: Path, what: str) -> Iterator[BinaryIO]:
     """A regular file, opened; anything else is refused and not opened."""
-    at_once = getattr(os, "O_NONBLOCK", 0)  # should the file have become a pipe
     try:
         kind = path.stat().st_mode
-        if stat.S_ISDIR(kind):
-            raise InputError(f"{path}: expected a {what}, got a folder")
         if not stat.S_ISREG(kind):
             found = "no regular file (a device, a pipe or a socket)"
+            if stat.S_ISDIR(kind):
+                found = "a folder"
             raise InputError(f"{path}: expected a {what}, got {found}")
-        with open(
-            path,
-            "rb",
-            opener=lambda name, flags: os.open(name, flags | at_once),
-        ) as file:
+        with path.open("rb") as file:
             yield file
     except InputError:
         raise
@@ -146,22 +139,11 @@ def read_text(path: Path, what: str, largest: int) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise _not_utf_8(path, what, data, error.start) from None
-
-
-def _not_utf_8(path: Path, what: str, data: bytes, start: int) -> InputError:
-    """Error for a file whose bytes are not UTF-8 from `start` on."""
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        place = str(path)
-        found = "UTF-16"
-    else:
-        line = data.count(b"\n", 0, start) + 1
-        byte = data[start]
-        place = f"{path}: line {line}"
-        found = f"byte 0x{byte:02x} (binary content)"
-    return InputError(
-        f"{place}: expected a {what} in UTF-8, got {found}; save it as text in UTF-8"
-    )
+        line = data.count(b"\n", 0, error.start) + 1
+        raise InputError(
+            f"{path}: line {line}: expected a {what} in UTF-8, got byte"
+            f" 0x{data[error.start]:02x} (binary content); save it as text in UTF-8"
+        ) from None
 
 
 def read_json(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
@@ -176,9 +158,8 @@ def read_json(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
 
 def parse_json(text: str, where: str, remedy: str) -> Any:
     """Parse JSON within the limits of `check_content`; messages begin with `where`."""
-    loads = partial(json.loads, object_pairs_hook=_unrepeated)
     broken = "broken JSON ({}); the file may be cut short: " + remedy
-    return _parsed(loads, text, where, broken)
+    return _parsed(json.loads, text, where, broken)
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
@@ -256,48 +237,39 @@ def check_content(
     """
     if depth > DEEPEST:
         raise _too_deep(f"{where}:")
-    entries = value.items() if isinstance(value, dict) else enumerate(value)
-    for key, item in entries:
-        if isinstance(key, str):
-            _check_key(key, where)
-        if isinstance(item, dict | list):
-            place = _place(where, key, depth)
-            check_content(item, place, infinite, depth + 1)
+    for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+        if isinstance(key, str) and (len(key) > LONGEST_KEY or _UNWRITABLE.search(key)):
+            expected = f"keys of at most {LONGEST_KEY} characters"
+            raise unexpected(where, expected, key)
+        is_nested = isinstance(item, dict | list)
+        expected = "" if is_nested else _expected(key, item, infinite)
+        if not is_nested and not expected:
             continue
-        expected = _expected(key, item, infinite)
+        sign = " " if depth == 1 else "."
+        place = f"{where}[{key}]" if isinstance(key, int) else f"{where}{sign}{key}"
         if expected:
-            place = _place(where, key, depth)
             raise unexpected(place, expected, item)
-
-
-def _check_key(key: str, where: str) -> None:
-    if len(key) > LONGEST_KEY or _UNWRITABLE.search(key):
-        expected = f"keys of at most {LONGEST_KEY} characters"
-        raise unexpected(where, expected, key)
-
-
-def _place(where: str, key: str | int, depth: int) -> str:
-    """Place of an entry, as "model.json: steering.rates[2]"."""
-    if isinstance(key, int):
-        return f"{where}[{key}]"
-    return f"{where} {key}" if depth == 1 else f"{where}.{key}"
+        check_content(item, place, infinite, depth + 1)
 
 
 def _expected(key: str | int, value: Any, infinite: bool) -> str:
     """Expectation that a single value does not meet; empty if none."""
-    if value is None or isinstance(value, bool):
-        return ""
-    if isinstance(value, float):
-        fine = abs(value) <= LARGEST_NUMBER or (infinite and math.isinf(value))
-        return "" if fine else f"a number of magnitude {LARGEST_NUMBER:g} at most"
-    if isinstance(value, int):
-        bits = 128 if key == "seed" else 64  # NumPy draws seeds of 128 bits
-        fine = value.bit_length() <= bits
-        return "" if fine else f"an integer of at most {bits} bits"
-    if isinstance(value, str):
-        fine = not _UNWRITABLE.search(value)
-        return "" if fine else "a string without null bytes and halves of characters"
-    return "a string, a number or a boolean"
+    bits = 128 if key == "seed" else 64  # NumPy draws seeds of 128 bits
+    match value:
+        case None | bool():
+            return ""
+        case float():
+            fine = abs(value) <= LARGEST_NUMBER or (infinite and math.isinf(value))
+            expected = f"a number of magnitude {LARGEST_NUMBER:g} at most"
+        case int():
+            fine = value.bit_length() <= bits
+            expected = f"an integer of at most {bits} bits"
+        case str():
+            fine = not _UNWRITABLE.search(value)
+            expected = "a string without null bytes and halves of characters"
+        case _:
+            return "a string, a number or a boolean"
+    return "" if fine else expected
 
 
 def _parsed(
@@ -316,9 +288,6 @@ def _parsed(
         content = parse(text)
     except RecursionError:
         raise _too_deep(where) from None
-    except KeyError as error:
-        key = shown(error.args[0])
-        raise InputError(f"{where} expected each key once, got {key} twice") from None
     except (json.JSONDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{where} {broken.format(error)}") from None
     except ValueError:  # Python's limit to the digits of an integer
@@ -335,13 +304,3 @@ def _too_deep(where: str) -> InputError:
         f"{where} expected at most {DEEPEST} levels of lists and tables, got more; take"
         " another copy"
     )
-
-
-def _unrepeated(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Table of pairs; KeyError for a key that appears twice."""
-    table = dict(pairs)
-    if len(table) < len(pairs):
-        keys = Counter(key for key, _ in pairs)
-        ((repeated, _),) = keys.most_common(1)
-        raise KeyError(repeated)
-    return table

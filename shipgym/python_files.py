@@ -4,13 +4,7 @@ import hashlib
 import sys
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
-from inspect import (
-    CO_ASYNC_GENERATOR,
-    CO_COROUTINE,
-    CO_GENERATOR,
-    CO_VARARGS,
-    CO_VARKEYWORDS,
-)
+from inspect import CO_GENERATOR, CO_VARARGS, CO_VARKEYWORDS
 from pathlib import Path
 from sysconfig import get_path
 from time import monotonic
@@ -50,9 +44,6 @@ def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
         exec(code, vars(module))
     except BaseException as error:
         del sys.modules[name]
-        if isinstance(error, InputError):
-            place = _place_in(path, str(resolved), error)
-            raise InputError(f"{place}: {error}") from None
         if not isinstance(error, Exception | SystemExit):  # Ctrl-C
             raise
         raise _not_executed(path, str(resolved), error) from error
@@ -70,22 +61,18 @@ def working_folder() -> Iterator[None]:
         sys.path[:] = before
 
 
-def _place_in(path: Path, resolved: str, error: BaseException) -> str:
-    """Path, and line if known, at which a file failed."""
-    lines = [getattr(error, "lineno", None)]  # of a SyntaxError
-    for frame in extract_tb(error.__traceback__):
-        if frame.filename == resolved:
-            lines.append(frame.lineno)
-    return f"{path}, line {lines[-1]}" if lines[-1] else str(path)
-
-
 def _not_executed(path: Path, resolved: str, error: BaseException) -> InputError:
-    """Error of a file that failed: its last line, and that of what it imports."""
+    """Error of a file that failed: its line, and that of what it imports."""
+    line = getattr(error, "lineno", None)  # of a SyntaxError
     imported = ""
     for frame in extract_tb(error.__traceback__):
-        if not frame.filename.startswith(("<", resolved, *LIBRARIES)):
+        if frame.filename == resolved:
+            line = frame.lineno
+        elif not frame.filename.startswith(("<", *LIBRARIES)):
             imported = f" ({frame.filename}, line {frame.lineno})"
-    place = _place_in(path, resolved, error)
+    place = f"{path}, line {line}" if line else str(path)
+    if isinstance(error, InputError):
+        return InputError(f"{place}: {error}")
     why = f"{type(error).__name__}: {error}{imported}"
     return InputError(f"{place}: cannot be executed: {why}")
 
@@ -104,22 +91,17 @@ def check_function(
     if not isinstance(value, FunctionType):
         raise InputError(f"{where}: expected {what}, got no plain function")
     code = value.__code__
-    not_plain = (
-        CO_VARARGS | CO_VARKEYWORDS | CO_GENERATOR | CO_COROUTINE | CO_ASYNC_GENERATOR
-    )
-    if code.co_flags & not_plain:
-        raise InputError(
-            f"{where}: expected {what}, got one with variable arguments, a generator or"
-            " a coroutine"
-        )
     names = code.co_varnames[: code.co_argcount]
     unknown = set(names[count:]) - set(extras)
-    if len(names) < count or (unknown and not extras):
-        raise InputError(
-            f"{where}: expected {what}, got one of {code.co_argcount} arguments"
-        )
-    if unknown:
-        raise InputError(f"{where}: expected {what}, got one with {unknown.pop()!r}")
+    if code.co_flags & (CO_VARARGS | CO_VARKEYWORDS | CO_GENERATOR):
+        found = "one with variable arguments or a generator"
+    elif len(names) < count or (unknown and not extras):
+        found = f"one of {len(names)} arguments"
+    elif unknown:
+        found = f"one with {unknown.pop()!r}"
+    else:
+        return
+    raise InputError(f"{where}: expected {what}, got {found}")
 
 
 def refuse_closure(function: Any) -> None:

@@ -10,14 +10,15 @@ import pandas as pd
 from agents.benchmarking.entries import Entry, file_hash
 from agents.suites.suite import FIRST_SEED, BenchmarkTask
 from shipgym.arrays import Floats
-from shipgym.checks import ANY_KEY, Shape, check_shape
+from shipgym.checks import check_table
 from shipgym.errors import InputError
 
-CELL: Shape = {
-    "refused": (str,),
-    "figures": {ANY_KEY: (np.ndarray,)},
-    "failure": (str,),
-    "seconds_per_action": (int, float),
+#: Types of a cell's fields in a file.
+CELL = {
+    "refused": str,
+    "figures": dict,
+    "failure": str,
+    "seconds_per_action": int | float,
 }
 
 
@@ -66,14 +67,17 @@ class Cell:
 
         Raises InputError, beginning with `where`, if it is not of so many episodes.
         """
-        check_shape(content, CELL, where)
-        cell = cls(**content)
-        n_runs = len(cell.costs)
+        table = check_table(content, where, CELL, CELL)
+        cell = cls(**table)
         needed = {"cost", "terminated", "failed"}
-        whole = bool(cell.refused) or needed <= cell.figures.keys()
-        for values in cell.figures.values():
-            is_number = values.dtype.kind in "bif"
-            whole = whole and is_number and values.shape == (n_runs, n_episodes)
+        whole = all(isinstance(table[name], kind) for name, kind in CELL.items())
+        whole = whole and (bool(cell.refused) or needed <= cell.figures.keys())
+        if whole and cell.figures:
+            arrays = [np.asarray(values) for values in cell.figures.values()]
+            n_runs = len(arrays[0]) if arrays[0].ndim else 0
+            for array in arrays:
+                is_number = array.dtype.kind in "bif"
+                whole = whole and is_number and array.shape == (n_runs, n_episodes)
         if not whole:
             raise InputError(
                 f"{where}: expected cost and other figures of {n_episodes} episodes"

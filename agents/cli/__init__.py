@@ -106,7 +106,7 @@ def doctor_command() -> None:
     from agents.cli.terminal import answer, say
 
     findings = examine_installation()
-    answer({"findings": [vars(finding) for finding in findings]})
+    answer({"findings": [finding._asdict() for finding in findings]})
     say(*(finding.line() for finding in findings))
     if any(finding.state == "wrong" for finding in findings):
         raise typer.Exit(FAILED)
@@ -149,9 +149,6 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 
 def main() -> None:
     """Run the command line."""
-    if sys.stdout is None:
-        sys.exit("error: standard output is closed")
-    sys.stderr = sys.stderr or Path(os.devnull).open("w")  # noqa: SIM115 - until the end
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # names of files may have any bytes
             stream.reconfigure(errors="backslashreplace")
@@ -164,7 +161,3 @@ def main() -> None:
         sys.exit(report_os_error(error))
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
-    finally:
-        # all is done: an interruption now could only end in a traceback
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)

@@ -140,16 +140,10 @@ class CommandGroup(TyperGroup):
         return super().resolve_command(ctx, args)
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:
-        """Refuse arguments that are empty or have a null byte."""
-        before = ""
-        for text in args:
-            name = "argument"
-            value = text
-            if text.startswith("--") and "=" in text:
-                name, _, value = text.partition("=")
-            elif before.startswith("-"):
-                name = before
-            if not value or "\0" in text:
-                ctx.fail(f"{name}: expected a non-empty string, got {value!r}")
-            before = text
+        """Refuse arguments that are empty."""
+        for before, text in zip(["argument", *args], args, strict=False):
+            name, sign, value = text.partition("=")
+            if not text or (sign and not value and name.startswith("--")):
+                option = name or (before if before.startswith("-") else "argument")
+                ctx.fail(f"{option}: expected a non-empty string, got ''")
         return super().parse_args(ctx, args)

@@ -6,45 +6,30 @@ import os
 import platform
 import re
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from rich.text import Text
 
 import shipgym
 from shipgym.engine.cache import CACHE_VARIABLE, cache_folder
 
-#: Marks and colours of the states of a finding: it works; an optional package is not
-#: installed; something does not work.
-MARKS = {
-    "fine": ("ok", "green"),
-    "absent": ("absent", "dim"),
-    "wrong": ("wrong", "bold red"),
-}
+#: Colours of the states of a finding: it works; an optional package is not installed;
+#: something does not work.
+COLOURS = {"fine": "green", "absent": "dim", "wrong": "bold red"}
 
 
-@dataclass(frozen=True)
-class Finding:
-    """The result of one check.
+class Finding(NamedTuple):
+    """The result of one check."""
 
-    Attributes
-    ----------
-    what : str
-        What was checked.
-    state : str
-        A key of `MARKS`.
-    detail : str
-        What was found and, where needed, what to do.
-    """
-
-    what: str
-    state: str
-    detail: str
+    what: str  # was checked
+    state: str  # a key of `COLOURS`
+    detail: str  # what was found and, where needed, what to do
 
     def line(self) -> Text:
         """One line for the terminal."""
-        mark, style = MARKS[self.state]
-        return Text.assemble((f"{mark:<6}", style), f"  {self.what:<20} {self.detail}")
+        mark = (f"{self.state:<6}", COLOURS[self.state])
+        return Text.assemble(mark, f"  {self.what:<20} {self.detail}")
 
 
 def examine_installation() -> list[Finding]:
@@ -104,13 +89,12 @@ def package_finding(
 
 
 def cache_finding() -> Finding:
-    """Place and size of the cache of compiled ships, and whether it can be written."""
+    """Place of the cache of compiled ships, and whether it can be written."""
     folder = cache_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        files = [path for path in folder.iterdir() if path.is_file()]
         with tempfile.NamedTemporaryFile(dir=folder):
-            pass
+            return Finding("cache", "fine", str(folder))
     except OSError as error:
         return Finding(
             "cache",
@@ -118,17 +102,6 @@ def cache_finding() -> Finding:
             f"{folder} cannot be written ({error.strerror}): what it lacks is compiled"
             f" again in each process; set {CACHE_VARIABLE} to a folder that can be",
         )
-    sizes = [size for path in files if (size := size_of(path)) is not None]
-    megabytes = sum(sizes) / 1e6
-    return Finding("cache", "fine", f"{folder}, {len(sizes)} files, {megabytes:.1f} MB")
-
-
-def size_of(path: Path) -> int | None:
-    """Size of a file in bytes; None if it is gone, as a draft of another process."""
-    try:
-        return path.stat().st_size
-    except FileNotFoundError:
-        return None
 
 
 def name_finding(name: str) -> Finding:

@@ -62,6 +62,8 @@ def prediction_table(result: IdentificationResult, note: str = "") -> Table:
         "measured -> predicted\n(rudder reversed at headings)", no_wrap=True
     )
 
+    from identification.report.view import index_lines
+
     degrees = 180.0 / np.pi
     scales = {"psi": degrees, "r": degrees, "u": 1.0, "v": 1.0}
     for file, metrics in result.metrics["trials"].items():
@@ -71,32 +73,11 @@ def prediction_table(result: IdentificationResult, note: str = "") -> Table:
             if error is not None:
                 error *= scale
             errors.append(number(error, 3))
-        indices: str | Text = _indices(metrics)
+        indices = Text("\n".join(index_lines(metrics)))
         if metrics["diverged"]:
             indices = Text("ran away", "bold red")
         table.add_row(PurePath(file).name, metrics["use"], *errors, indices)
     return table
-
-
-def _indices(metrics: Mapping[str, Any]) -> str:
-    """Indices of a trial, measured and predicted, a line each."""
-    labels = {
-        "overshoot_1_deg": "1st",
-        "overshoot_2_deg": "2nd",
-        "advance_lengths": "advance",
-        "tactical_diameter_lengths": "diameter",
-    }
-    lines = []
-    for name, label in labels.items():
-        index = metrics.get(name)
-        if index is None:
-            continue
-        line = f"{label} {number(index['measured'], 2)}"
-        line += f" -> {number(index['predicted'], 2)}"
-        if "closed_loop" in index:
-            line += f" ({number(index['closed_loop'], 2)})"
-        lines.append(line)
-    return "\n".join(lines)
 
 
 def selection_table(ranking: Mapping[str, Any]) -> Table:
@@ -129,65 +110,55 @@ def selection_table(ranking: Mapping[str, Any]) -> Table:
 def manoeuvre_table(
     rows: Mapping[str, Mapping[str, IndexInterval]], water: str = "deep water"
 ) -> Table:
-    """Indices of manoeuvres, one line each, with intervals if models were drawn."""
-    has_draws = False
-    for indices in rows.values():
-        for index in indices.values():
-            has_draws = has_draws or len(index.values) > 0
-    headings = ["manoeuvre", "index", ">value"]
-    if has_draws:
-        headings += [">95 % interval", ">draws without value"]
-    table = plain_table(f"Manoeuvres from service speed in {water}", *headings)
-
+    """Indices of manoeuvres, one line each, with the intervals of models drawn."""
+    table = plain_table(
+        f"Manoeuvres from service speed in {water}",
+        "manoeuvre",
+        "index",
+        ">value",
+        ">95 % interval",
+        ">draws without value",
+    )
     for manoeuvre, indices in rows.items():
         label = manoeuvre
         for name, index in indices.items():
-            cells = [label, name, number(index.value, 2)]
-            if has_draws:
-                without_value = index.n_ran_away + index.n_never_reached
-                cells += [between(index.interval, 2), str(without_value)]
-            table.add_row(*cells)
+            without_value = "-"
+            if len(index.values):
+                without_value = str(index.n_ran_away + index.n_never_reached)
+            interval = between(index.interval, 2)
+            table.add_row(label, name, number(index.value, 2), interval, without_value)
             label = ""
     return table
 
 
 def criteria_table(criteria: Mapping[str, Criterion]) -> Table:
     """IMO criteria, with interval and probability of passing if models were drawn."""
-    hidden = {">95 % interval", ">probability", ">measured"}
-    for criterion in criteria.values():
-        if criterion.share_passed is not None:
-            hidden -= {">95 % interval", ">probability"}
-        if criterion.measured is not None:
-            hidden.discard(">measured")
-
-    rows = []
-    headings: list[str] = []
+    table = plain_table(
+        "IMO criteria, resolution MSC.137(76)",
+        "criterion",
+        ">measured",
+        ">value",
+        ">95 % interval",
+        ">limit",
+        "unit",
+        "verdict",
+        ">probability",
+        "manoeuvre",
+    )
     for name, criterion in criteria.items():
-        cells = _criterion_cells(name, criterion)
-        headings = [heading for heading in cells if heading not in hidden]
-        rows.append([cells[heading] for heading in headings])
-    table = plain_table("IMO criteria, resolution MSC.137(76)", *headings)
-    for row in rows:
-        table.add_row(*row)
+        probability = criterion.probability
+        table.add_row(
+            name,
+            measured_in_words(criterion),
+            number(criterion.value, 2),
+            between(criterion.interval, 2),
+            number(criterion.limit, 2),
+            criterion.unit,
+            _verdict(criterion),
+            "-" if probability is None else f"{100 * probability:.1f} %",
+            criterion.manoeuvre,
+        )
     return table
-
-
-def _criterion_cells(name: str, criterion: Criterion) -> dict[str, str | Text]:
-    """Cells of a criterion by heading."""
-    probability = criterion.probability
-    _, _, paragraph = criterion.source.rpartition(" ")
-    return {
-        "criterion": name,
-        ">measured": measured_in_words(criterion),
-        ">value": number(criterion.value, 2),
-        ">95 % interval": between(criterion.interval, 2),
-        ">limit": number(criterion.limit, 2),
-        "unit": criterion.unit,
-        "verdict": _verdict(criterion),
-        ">probability": "-" if probability is None else f"{100 * probability:.1f} %",
-        "manoeuvre": criterion.manoeuvre,
-        "paragraph": paragraph,
-    }
 
 
 def measured_in_words(criterion: Criterion) -> str:

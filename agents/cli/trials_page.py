@@ -9,8 +9,7 @@ from shipgym.files import write_text
 from shipgym.manoeuvres.standard import FAMILIES, Manoeuvre
 from shipgym.models import ShipModel
 from shipgym.pages import render
-from shipgym.plots import history_figure, manoeuvre_figure, path_figure
-from shipgym.trials.trial import Trial
+from shipgym.plots import manoeuvre_figure, path_figure
 
 #: Name in the page, plotly figure, and caption.
 Figure = tuple[str, Any, str]
@@ -59,22 +58,8 @@ def _section(
 def _figures(
     name: str, family: dict[str, Manoeuvre], trials: StandardTrials
 ) -> list[Figure]:
-    """All figures of one family of manoeuvres."""
+    """A figure of each manoeuvre of one family, and one of all paths."""
     runs = {key: run for key, run in trials.runs.items() if key in family}
-    figures = _manoeuvre_figures(name, family, runs)
-    if runs:
-        caption = "Paths from above, north up, in metres."
-        figures.append((f"{name}-paths", path_figure(runs), caption))
-        figure = history_figure(runs, ("psi", "delta", "r", "speed", "drift"))
-        caption = "Time histories: heading, rudder, yaw rate, speed and drift angle."
-        figures.append((f"{name}-histories", figure, caption))
-    return figures
-
-
-def _manoeuvre_figures(
-    name: str, family: dict[str, Manoeuvre], runs: dict[str, Trial]
-) -> list[Figure]:
-    """A figure of each manoeuvre."""
     figures = []
     for number, (key, run) in enumerate(runs.items()):
         manoeuvre = family[key]
@@ -82,6 +67,9 @@ def _manoeuvre_figures(
         title = key[0].upper() + key[1:]
         caption = f"{title}. {manoeuvre.caption}"
         figures.append((f"{name}-{number}", draw(run), caption))
+    if runs:
+        caption = "Paths from above, north up, in metres."
+        figures.append((f"{name}-paths", path_figure(runs), caption))
     return figures
 
 

@@ -1,10 +1,10 @@
 """Figures of an identification: the regression, its residuals, rank, and the trials."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.estimators.covariance import residuals
 from identification.estimators.lssvm import TruncatedLSSVM
@@ -12,7 +12,7 @@ from identification.judging.diagnostics import autocorrelation, without_overlap
 from identification.judging.fit import Fit
 from identification.judging.warnings import EQUATIONS
 from identification.report.predictions import overview_figure, prediction_figure
-from shipgym.arrays import Floats, Integers
+from shipgym.arrays import Integers
 from shipgym.manoeuvres.quantiles import NORMAL_95
 from shipgym.plots import Panel, axis, compact, graph_objects, line, panels, points
 from shipgym.plots.style import LIMIT, MEASURED, MODEL, MUTED, Figure
@@ -54,46 +54,27 @@ def regression_figures(fit: Fit) -> dict[str, Figure]:
     return found
 
 
-class WindowAccelerations(NamedTuple):
-    """Mean acceleration of some windows, m/s^2 or deg/s^2."""
-
-    measured: Floats
-    explained: Floats
-
-
 def fit_figure(fit: Fit) -> Figure:
     """Mean acceleration over each window, as measured and as the regression has it."""
     samples = fit.samples
     most_rows = 2500  # drawn of one equation
-    every = max(len(samples) // most_rows, 1)
-    drawn = slice(None, None, every)
+    drawn = slice(None, None, max(len(samples) // most_rows, 1))
     breaks = np.flatnonzero(np.diff(samples.trial[drawn])) + 1
     shown = []
-    for q in fit.estimators:
-        found = mean_accelerations(fit, q, drawn)
-        measured = np.insert(found.measured, breaks, np.nan)  # gaps between the trials
-        explained = np.insert(found.explained, breaks, np.nan)
-        windows = np.arange(len(measured))
-        lines = [
-            line(windows, measured, "trials", MEASURED, 1.2),
-            line(windows, explained, "regression", MODEL, 1.7),
-        ]
+    for q, estimator in fit.estimators.items():
+        unit = np.degrees(1.0) if q in "rp" else 1.0
+        explained = estimator.predict(samples.features[q])
+        lines = []
+        for change, name, colour, width in (
+            (samples.targets[q], "trials", MEASURED, 1.2),
+            (explained, "regression", MODEL, 1.7),
+        ):
+            acceleration = (change * unit / samples.duration)[drawn]
+            gapped = np.insert(acceleration, breaks, np.nan)  # between the trials
+            lines.append(line(np.arange(len(gapped)), gapped, name, colour, width))
         title = axis(f"{EQUATIONS[q]}, {UNITS[q]}", nticks=5)
         shown.append(Panel(lines, "window, trial after trial", title))
     return panels(shown, 190 * len(shown) + 80, 1, outer=True, hovermode="closest")
-
-
-def mean_accelerations(fit: Fit, q: str, rows: slice) -> WindowAccelerations:
-    """Mean accelerations of an equation over some windows."""
-    samples = fit.samples
-    unit = np.degrees(1.0) if q in "rp" else 1.0
-    factor = unit / samples.duration
-    explained = fit.estimators[q].predict(samples.features[q])
-    measured = samples.targets[q]
-    return WindowAccelerations(
-        measured=(measured * factor)[rows],
-        explained=(explained * factor)[rows],
-    )
 
 
 def residual_figure(fit: Fit) -> Figure:
@@ -174,6 +155,7 @@ def _l_curve_panel(q: str, estimator: TruncatedLSSVM) -> Panel:
         hovertemplate="rank %{text}<extra></extra>",
     )
     own = slice(rank - 1, rank)
+    decades: dict[str, Any] = {"type": "log", "tickformat": "~g", "nticks": 6}
     chosen = points(
         x[own],
         y[own],
@@ -185,20 +167,7 @@ def _l_curve_panel(q: str, estimator: TruncatedLSSVM) -> Panel:
     )
     return Panel(
         [all_ranks, chosen],
-        _logarithmic("norm of the residuals", x),
-        _logarithmic("norm of the solution", y),
+        axis("norm of the residuals", **decades),
+        axis("norm of the solution", **decades),
         f"{EQUATIONS[q]}: rank {rank} of {len(x)}",
-    )
-
-
-def _logarithmic(title: str, values: NDArray[np.float32]) -> dict[str, Any]:
-    """An axis in decades, or in steps of 1, 2, 5 where there are few."""
-    positive = np.finfo(np.float32).tiny
-    smallest = max(values.min(), positive)
-    few_decades = values.max() < 100.0 * smallest
-    return axis(
-        title,
-        type="log",
-        dtick="D2" if few_decades else 1,
-        tickformat="~g",
     )

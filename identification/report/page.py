@@ -1,7 +1,6 @@
 """The report of an identification: one self-contained HTML page."""
 
 import warnings
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ from identification.judging.warnings import why_unstable
 from identification.report.figures import regression_figures
 from identification.report.view import fit_view, trial_figures
 from shipgym.files import write_text
-from shipgym.pages import NONE, render
+from shipgym.pages import render
 
 
 def report_page(fit: Fit) -> str:
@@ -29,8 +28,6 @@ def report_page(fit: Fit) -> str:
         fit=fit_view(fit),
         figures=figures,
         instability=instability,
-        settings=settings_rows(fit.settings),
-        trials=fit.settings["trials"],
     )
 
 
@@ -49,32 +46,3 @@ def write_report(fit: Fit, folder: str | Path) -> None:
         )
         return
     write_text(report_page(fit), Path(folder) / "report.html")
-
-
-def settings_rows(settings: Mapping[str, Any]) -> dict[str, str]:
-    """Arguments of `identify` in words, without those that have tables of their own."""
-    shown_elsewhere = ("trials", "particulars", "steering")
-    rows = {}
-    for name, value in settings.items():
-        if value is None or name in shown_elsewhere:
-            continue
-        words = name.replace("_", " ")
-        rows[words] = setting_text(value)
-    return rows
-
-
-def setting_text(value: Any) -> str:
-    """A setting in words; for a stage each of its own settings."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, Mapping):
-        parts = []
-        for name, item in value.items():
-            if item is not None:
-                words = name.replace("_", " ")
-                parts.append(f"{words} {setting_text(item)}")
-        return ", ".join(parts)
-    if isinstance(value, list | tuple):
-        items = [str(item) for item in value]
-        return ", ".join(items) or NONE
-    return str(value)

@@ -28,7 +28,6 @@ from identification.pipeline.summary import (
 from identification.report.predictions import (
     overview_figure,
     prediction_figure,
-    track_figure,
 )
 from shipgym import Trial
 from shipgym.pages import NONE, fixed, number
@@ -65,7 +64,6 @@ def fit_view(fit: Fit) -> dict[str, Any]:
         "cards": {
             "ship": _ship_card(fit),
             "data": _data_card(fit),
-            "fit": _fit_card(fit),
             "quality": _quality_card(fit),
         },
         "held_out": held_out_error(fit),
@@ -104,7 +102,6 @@ def trial_figures(fit: Fit) -> dict[str, Any]:
         if trial.use == "validate"
     ]
     return {
-        "tracks": track_figure(fit),
         "overview": overview_figure(fitted, fit.predictions),
         "predictions": predictions,
     }
@@ -126,15 +123,6 @@ def _data_card(fit: Fit) -> Card:
     minutes = number(sum(trial.duration for trial in fit.trials) / 60, 2)
     detail = f"{to_validate} to validate; {samples} samples, {minutes} min"
     return Card("Data", f"{to_fit} to fit", detail)
-
-
-def _fit_card(fit: Fit) -> Card:
-    equations = fit.diagnostics.values()
-    rank = sum(equation.rank for equation in equations)
-    terms = sum(equation.terms for equation in equations)
-    lowest = fixed(min(equation.r_squared for equation in equations), 3)
-    detail = f"directions of the features kept; lowest R² of an equation {lowest}"
-    return Card("Fit", f"{rank} of {terms}", detail)
 
 
 def _quality_card(fit: Fit) -> Card:

@@ -1,5 +1,4 @@
 from .manoeuvres import manoeuvre_figure as manoeuvre_figure
-from .manoeuvres import speed_figure as speed_figure
 from .manoeuvres import turning_figure as turning_figure
 from .manoeuvres import zigzag_figure as zigzag_figure
 from .style import LIMIT as LIMIT

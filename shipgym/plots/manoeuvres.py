@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from shipgym.manoeuvres.execution import distance_sailed, ship_length
+from shipgym.manoeuvres.execution import ship_length
 from shipgym.manoeuvres.turning import (
     TrackFromOrder,
     TurningIndices,
@@ -24,7 +24,7 @@ from shipgym.plots.style import (
     line,
     panels,
 )
-from shipgym.plots.trials import CHANNEL_AXES, history_figure, thinned
+from shipgym.plots.trials import history_figure
 from shipgym.trials.trial import Trial
 
 
@@ -119,24 +119,6 @@ def _dimension(x: list[float], y: list[float], name: str, colour: str) -> Any:
     )
 
 
-def speed_figure(trial: Trial) -> Figure:
-    """Plot a stop: surge speed over the distance sailed and over time.
-
-    The trial has u, v and the ship's length.
-    """
-    sailed = distance_sailed(trial) / ship_length(trial)
-    part = thinned(trial)
-    u = trial["u"][part]
-    title = axis(CHANNEL_AXES["u"].title, zero=True)
-    shown = []
-    for x, label in (
-        (sailed[part], "distance sailed, ship lengths"),
-        (trial.t[part], "time, s"),
-    ):
-        shown.append(Panel([line(x, u, "surge speed", MODEL)], label, title))
-    return panels(shown, height=380, columns=2, hovermode="closest")
-
-
 def manoeuvre_figure(sailed: Trial) -> Figure:
     """Plot a manoeuvre in the form of its kind; else time histories.
 
@@ -145,7 +127,6 @@ def manoeuvre_figure(sailed: Trial) -> Figure:
     known: dict[str | None, Callable[[Trial], Figure]] = {
         "zigzag": zigzag_figure,
         "turning-circle": turning_figure,
-        "straight": speed_figure,
     }
     if sailed.kind in known:
         return known[sailed.kind](sailed)

@@ -76,7 +76,7 @@ def history_figure(
     The trial called "measured" is drawn dark; channels that no trial has are left out;
     InputError if all are.
     """
-    histories = [_history(trials, name) for name in channels]
+    histories = [history_panel(trials, name) for name in channels]
     shown = [panel for panel in histories if panel.traces]
     if not shown:
         names = ", ".join(channels)
@@ -89,7 +89,7 @@ def history_figure(
     return panels(shown, height, outer=True, grid=grid)
 
 
-def _history(trials: Mapping[str, Trial], channel: str) -> Panel:
+def history_panel(trials: Mapping[str, Trial], channel: str) -> Panel:
     """One channel of all trials that have it, over time."""
     title, factor = CHANNEL_AXES[channel]
     styles = line_styles(trials)
@@ -115,24 +115,25 @@ def path_figure(trials: Mapping[str, Trial]) -> Figure:
 
     Trials without x and y are left out; InputError if no trial has a position.
     """
+    panel = path_panel(trials)
+    if not panel.traces:
+        raise InputError("figure: expected a trial with the channels x and y, got none")
+    return panels([panel], height=460, hovermode="closest")
+
+
+def path_panel(trials: Mapping[str, Trial], axis_name: str = "x") -> Panel:
+    """Paths of all trials that have a position, to the scale of the axis named."""
     styles = line_styles(trials)
     tracks = []
     for label, trial in trials.items():
-        if "x" not in trial or "y" not in trial:
-            continue
-        part = thinned(trial)
-        north = trial["x"][part]
-        east = trial["y"][part]
-        style = styles[label]
-        track = line(east, north, label, **style)
-        tracks.append(track)
-    if not tracks:
-        raise InputError("figure: expected a trial with the channels x and y, got none")
-    to_east = CHANNEL_AXES["y"].title
-    to_north = CHANNEL_AXES["x"].title
-    panel = Panel(
-        tracks,
-        x=to_east,
-        y=axis(to_north, scaleanchor="x", scaleratio=1),
-    )
-    return panels([panel], height=460, hovermode="closest")
+        if "x" in trial and "y" in trial:
+            part = thinned(trial)
+            track = line(
+                trial["y"][part],
+                trial["x"][part],
+                label,
+                **styles[label],
+            )
+            tracks.append(track)
+    north = axis(CHANNEL_AXES["x"].title, scaleanchor=axis_name, scaleratio=1)
+    return Panel(tracks, x=CHANNEL_AXES["y"].title, y=north)

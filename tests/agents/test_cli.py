@@ -203,12 +203,11 @@ def test_trials_writes_figures_that_work_offline(tmp_path):
     assert answer.exit_code == 0
     page = (tmp_path / "plots.html").read_text()
     names = re.findall(r'Plotly.newPlot\("plot-([\w-]+)"', page)
-    assert len(set(names)) == len(names) == 10
+    assert len(set(names)) == len(names) == 8
     assert {"zigzags-paths", "circles-1"} <= set(names)
     for caption in (
         "Zigzag 20/20, starboard first. ",
         "Paths from above, north up, in metres.",
-        "Time histories: heading, rudder, yaw rate, speed and drift angle.",
     ):
         assert caption in page
     assert 'src="http' not in page
@@ -277,8 +276,6 @@ def test_an_unexpected_error_keeps_its_traceback():
         (["identify", ""], "argument: expected a non-empty string, got ''"),
         (["identify", "x", "--out", ""], "--out: expected a non-empty string, got ''"),
         (["identify", "--out="], "--out: expected a non-empty string, got ''"),
-        (["look", "a\0b"], "argument: expected a non-empty string, got 'a\\x00b'"),
-        (["look", "--out=\0"], "--out: expected a non-empty string, got '\\x00'"),
     ],
 )
 def test_an_empty_argument_is_refused_by_the_name_of_its_option(words, message):

@@ -24,15 +24,11 @@ from shipgym import RecordEpisode, example_ship, load_model
 from tests.agents.small_suite import write_suite
 
 LINEAR = (
-    "--structure abkowitz --method ridge --preprocessing none --hold-out"
-    " zigzag_15_15.csv --current none --wind none --uncertainty analytic"
-    " --set alpha=0.01"
+    "--structure abkowitz --method ridge --set preprocessing=none"
+    " --set hold_out=zigzag_15_15.csv --set alpha=0.01"
 )
 GREY = "--structure grey-box --reference-model mariner"
-WRONG = (
-    "--structure abkowitz --reference-model mariner --kernel none-such --prior auto"
-    " --prior-strength 1"
-)
+WRONG = "--structure abkowitz --reference-model mariner --set kernel=none-such"
 TASK = "--task rough-path"
 #: Sizes at which a rollout of learning takes a moment.
 SMALL = "--set ships=2 --set n_steps=16 --set batch_size=16 --set evaluate_every=32"
@@ -47,7 +43,7 @@ LINES = (
     ("new-ship zigzag_15_15.csv --length 160.9 --out new.toml", 0),
     ("look ship.toml --out look.html", 0),
     (f"identify ship.toml {LINEAR} --out linear", 0),
-    (f"identify ship.toml {GREY} --kernel rbf --out grey", 0),
+    (f"identify ship.toml {GREY} --set kernel=rbf --out grey", 0),
     (f"advise ship.toml {LINEAR} --criterion c --coefficient N_d --number 1", 0),
     (f"identify ship.toml {WRONG} --out wrong", 2),
     (f"advise ship.toml {WRONG}", 2),

@@ -11,7 +11,6 @@ from filelock import FileLock
 
 from agents import output
 from agents.output import check_file, check_folder, check_page, whole_folder
-from shipgym.drafts import remove_drafts
 from shipgym.errors import InputError
 
 NAMES = ("model.json", "metrics.json")
@@ -115,7 +114,6 @@ def test_a_second_process_takes_the_folder_over_when_the_first_is_killed(tmp_pat
             write(tmp_path / "ship")
         holder.kill()
     assert len(everything(tmp_path)) == 4  # folder, lock, draft, the file in it
-    remove_drafts.cache_clear()
     write(tmp_path / "ship")
     assert everything(tmp_path) == RESULT
 

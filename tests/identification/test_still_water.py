@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from identification import Uncertainty, identify
 from identification.judging.sentences import sea_sentences
-from identification.report.predictions import track_figure
 from identification.samples.still_water import in_still_water
 from identification.samples.velocities import through_water
 from shipgym import ShipModel, Trial
@@ -73,12 +70,6 @@ def test_a_current_is_found_and_taken_out(
     )
     np.testing.assert_allclose(drift, (row["north"], row["east"]))
     assert found[0].raw.sha256 == logs[0].sha256
-    fit: Any = SimpleNamespace(model=SimpleNamespace(provenance=report), trials=found)
-    assert [trace.name for trace in track_figure(fit).data[:3]] == [
-        "over ground",
-        "through the water",
-        "the water meanwhile",
-    ]
     told = sea_sentences(report)[0]
     assert told.startswith("turn, zigzag, held out: current of 0.5")
     assert told.endswith("which differs from zero; removed")

@@ -100,7 +100,7 @@ def test_every_manoeuvre_has_its_figure():
     axes = {
         "zigzag 20/20, port first": "heading change and rudder, deg",
         "turning circle 35 deg to port": "ahead, ship lengths",
-        "crash stop": "surge, m/s",
+        "crash stop": "heading, deg",
     }
     known = standard_manoeuvres(ship)
     for name, title in axes.items():

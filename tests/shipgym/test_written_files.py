@@ -2,64 +2,13 @@
 that did not."""
 
 import errno
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-from shipgym.drafts import (
-    abandoned_drafts,
-    draft_folder,
-    draft_name,
-    remove_drafts,
-)
+from shipgym.drafts import draft_folder, draft_name
 from shipgym.errors import InputError
 from shipgym.files import make_folder, write_text
-
-WEEK = 7 * 86400
-
-
-@pytest.fixture
-def dead():
-    """Number of a process that is no more."""
-    with subprocess.Popen([sys.executable, "-c", ""]) as process:
-        process.wait()
-        return process.pid
-
-
-def draft(path, process, host=None):
-    own = draft_name(path).name
-    name = own.replace(str(os.getpid()), str(process))
-    left = path.with_name(
-        name if host is None else name.replace(own.split(".")[-2].split("-")[0], host)
-    )
-    left.write_text("half")
-    return left
-
-
-def test_drafts_of_dead_processes_are_removed_by_the_next_writer_beside(tmp_path, dead):
-    left = draft(tmp_path / "model.json", dead)
-    (
-        draft_name(tmp_path / "ship").with_name(left.name.replace("model.json", "ship"))
-    ).mkdir()
-    living, elsewhere = (
-        draft(tmp_path / "a", os.getppid()),
-        draft(tmp_path / "b", dead, "00000000"),
-    )
-    (tmp_path / ".mine.draft").write_text("not one of these")
-    write_text("whole", tmp_path / "new")
-    assert {path.name for path in tmp_path.iterdir()} == {
-        "new",
-        ".mine.draft",
-        living.name,
-        elsewhere.name,
-    }
-    for path in (living, elsewhere):
-        os.utime(path, (path.stat().st_mtime - WEEK - 1,) * 2)
-    assert sorted(abandoned_drafts(tmp_path)) == sorted([living, elsewhere])
-    remove_drafts.cache_clear()
 
 
 def test_a_draft_has_a_random_name_and_never_follows_what_lies_there(
@@ -124,10 +73,8 @@ def test_a_refusal_gives_the_reason_of_the_system_in_words(tmp_path):
         make_folder(tmp_path / "file" / "first")
 
 
-def test_a_folder_is_removed_unless_it_was_renamed(tmp_path, dead):
-    left = draft(tmp_path / "result", dead)
+def test_a_folder_is_removed_unless_it_was_renamed(tmp_path):
     with draft_folder(tmp_path / "result") as folder:
-        assert not left.exists()
         assert list(folder.iterdir()) == []
         (folder / "new").write_text("whole")
         folder.rename(tmp_path / "result")
