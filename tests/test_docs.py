@@ -22,6 +22,7 @@ import types
 from pathlib import Path
 
 import document_api
+import gymnasium
 import numba
 import pytest
 import sklearn.linear_model  # noqa: F401 - what many pages need is loaded once, before they fork
@@ -30,6 +31,7 @@ from plotly.basedatatypes import BaseFigure
 import identification.pipeline
 import identification.pipeline.result  # noqa: F401
 from shipgym import example_ship
+from shipgym.envs.registration import ENVIRONMENTS
 
 ROOT = Path(__file__).parents[1]
 BLOCK = re.compile(
@@ -46,6 +48,10 @@ PAGES = [
 PLAIN = "docs/environments/"
 SMALLER = {
     "num_envs=1024": "num_envs=3",
+    "learn(20_000)": "learn(64)",
+    "learn(65_000)": "learn(64)",
+    "episodes=10": "episodes=1",
+    "range(20)": "range(2)",
     "range(1000)": "range(3)",
     "n_draws=200": "n_draws=3",
     "threads=2": "threads=1",
@@ -111,3 +117,17 @@ def test_the_reference_has_every_public_name():
         for path in (ROOT / "docs" / "api").glob("*.md")
     }
     assert written == document_api.pages()
+
+
+def test_the_table_of_ids_is_that_of_the_environments():
+    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    rows = re.findall(
+        r"`(\w+-v0)`.* \| `(rudder[-a-z]*)`.* \| (\d+) \| `(.*)` \|", text
+    )
+    assert [f"shipgym/{name}" for name, *_ in rows] == [*ENVIRONMENTS]
+    for name, action, count, model in rows:
+        env = gymnasium.make(f"shipgym/{name}").unwrapped
+        keywords = ENVIRONMENTS[f"shipgym/{name}"]
+        assert keywords.get("action", "rudder") == action
+        assert len(env.observation_names) == int(count)
+        assert keywords.get("model", "mariner-tls-svm") == model

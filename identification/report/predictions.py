@@ -48,8 +48,15 @@ def prediction_figure(measured: Trial, predicted: Trial | None) -> Figure:
     runs = {"measured": measured}
     if predicted is not None:
         runs["predicted"] = predicted
-    shown = [history_panel(runs, name) for name in ("psi", "r", "u", "v", "delta")]
+    shown = []
+    for name in ("psi", "r", "u", "v", "delta"):
+        shown.append(history_panel(runs, name))
     if "x" in measured:
         shown.append(path_panel(runs, "x6"))
-    grid = {"vertical_spacing": 0.13}
-    return panels(shown, 700, columns=2, grid=grid, hovermode="closest")
+    return panels(
+        shown,
+        700,
+        columns=2,
+        grid={"vertical_spacing": 0.13},
+        hovermode="closest",
+    )

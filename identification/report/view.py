@@ -56,22 +56,29 @@ def fit_view(fit: Fit) -> dict[str, Any]:
     provenance = model.provenance or {}
     short = short_names(fit.trials)
     kernel = provenance.get("kernel")
+    trials = []
+    for trial in fit.trials:
+        trials.append(trial_cells(trial, short[trial.name]))
     fitted = sum(trial.use == "fit" for trial in fit.trials)
+    errors = {}
+    for name, metrics in fit.metrics["trials"].items():
+        errors[short[name]] = (metrics, index_lines(metrics))
+    cards = {
+        "ship": _ship_card(fit),
+        "data": _data_card(fit),
+        "quality": _quality_card(fit),
+    }
     return {
         "lead": f"{how_identified(fit)}, from {counted(fitted, 'recorded manoeuvre')}.",
         "structure": model.structure,
         "provenance": provenance,
-        "cards": {
-            "ship": _ship_card(fit),
-            "data": _data_card(fit),
-            "quality": _quality_card(fit),
-        },
+        "cards": cards,
         "held_out": held_out_error(fit),
         "guarded": "rejected" in provenance.get("guard", {}),
         "warnings": model_warnings(fit),
         "findings": findings(provenance),
         "undetermined": undetermined(fit),
-        "trials": [trial_cells(trial, short[trial.name]) for trial in fit.trials],
+        "trials": trials,
         "equations": {
             EQUATIONS.get(name, name): equation
             for name, equation in fit.diagnostics.items()
@@ -81,10 +88,7 @@ def fit_view(fit: Fit) -> dict[str, Any]:
         "coefficients": _by_force(fit),
         "coefficient_notes": _coefficient_notes(fit),
         "kernel": kernel_text(kernel) if kernel else None,
-        "errors": {
-            short[name]: (metrics, index_lines(metrics))
-            for name, metrics in fit.metrics["trials"].items()
-        },
+        "errors": errors,
     }
 
 
@@ -143,11 +147,10 @@ def _quality_card(fit: Fit) -> Card:
 
 def _by_force(fit: Fit) -> dict[str, list[CoefficientRow]]:
     """Rows of coefficients by the title of their table: one a force, or one for all."""
-    derivatives = are_derivatives(fit.model)
     tables: dict[str, list[CoefficientRow]] = {}
     for row in coefficient_rows(fit):
         title = "coefficient"
-        if derivatives:
+        if are_derivatives(fit.model):
             force, _, _ = row.name.partition("_")
             title = FORCES.get(force, title)
         tables.setdefault(title, []).append(row)
