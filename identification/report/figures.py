@@ -104,8 +104,15 @@ def _bars_panel(lags: Integers, values: ArrayLike, bound: float, beside: str) ->
     traces = [bars]
     ends = [lags[0] - 0.5, lags[-1] + 0.5]
     for level in (-bound, bound):
-        name = "95 % bounds of white noise"
-        traces.append(line(ends, [level] * 2, name, LIMIT, 1.2, line_dash="dash"))
+        dashed = line(
+            ends,
+            [level] * 2,
+            "95 % bounds of white noise",
+            LIMIT,
+            1.2,
+            line_dash="dash",
+        )
+        traces.append(dashed)
 
     largest = float(np.max(np.abs(values), initial=0.0))
     reach = min(max(1.1 * largest, 3.0 * bound), 1.05)
