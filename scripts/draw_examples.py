@@ -1,4 +1,4 @@
-"""Draw docs/images/examples.png, the example tasks, and encounter.png.
+"""Draw pictures of the example tasks and the learning tasks for docs/images.
 
     python scripts/draw_examples.py
 
@@ -25,20 +25,27 @@ class Shown(NamedTuple):
     steps: int
 
 
-EXAMPLES = (
-    Shown("shipgym.examples:examples/Berth-v0", {}, 0.35, 40),
-    Shown("shipgym.examples:examples/River-v0", {}, 0.7, 25),
-    Shown("shipgym.examples:examples/Fairway-v0", {"dt": 5.0}, 0.7, 80),
-)
-ENCOUNTERS = (
-    Shown("shipgym:shipgym/Encounter-v0", {"case": 17}, 1.0, 40),
-    Shown("shipgym:shipgym/Encounter-v0", {"case": 14}, 1.0, 50),
-)
+ROWS = {
+    "examples": (
+        Shown("shipgym.examples:examples/Berth-v0", {}, 0.35, 40),
+        Shown("shipgym.examples:examples/River-v0", {}, 0.7, 25),
+        Shown("shipgym.examples:examples/Fairway-v0", {"dt": 5.0}, 0.7, 80),
+    ),
+    "encounter": (
+        Shown("shipgym:shipgym/Encounter-v0", {"case": 17}, 1.0, 40),
+        Shown("shipgym:shipgym/Encounter-v0", {"case": 14}, 1.0, 50),
+    ),
+    "unknown_ship": (
+        Shown("shipgym:shipgym/UnknownShip-v0", {"speed_range": (0.6, 0.6)}, 1.0, 90),
+        Shown("shipgym:shipgym/UnknownShip-v0", {"speed_range": (1.0, 1.0)}, 1.0, 90),
+    ),
+    "rudder_roll": (Shown("shipgym:shipgym/RudderRoll-v0", {}, 1.0, 100),),
+}
 
 
 def main() -> None:
-    """Write both, each several pictures side by side."""
-    for name, row in (("encounter", ENCOUNTERS), ("examples", EXAMPLES)):
+    """Write them, each several pictures side by side."""
+    for name, row in ROWS.items():
         montage = Image.new("RGB", (len(row) * SIZE, SIZE))
         for column, shown in enumerate(row):
             montage.paste(picture(shown), (column * SIZE, 0))

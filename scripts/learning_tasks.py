@@ -1,205 +1,224 @@
-"""Does learning pay in a task? The best rules and the best agents, compared.
+"""Does learning pay in a task? A rule and agents on the same 100 episodes.
 
-    python scripts/learning_tasks.py rudder_roll            search, train, compare
-    python scripts/learning_tasks.py rudder_roll --table    print what was found
+    python scripts/learning_tasks.py rudder-roll --seconds 60
+    python scripts/learning_tasks.py encounter --search 0    # the rule as it is shipped
+    python scripts/learning_tasks.py unknown-ship --seeds 3 --frames 8 --on-rule
 
-Each rule's numbers are searched by CMA-ES for so many seconds of processor time, as
-often as agents learn, with other seeds. All are judged on the same 100 episodes that
-neither has seen. Results: build/learning_tasks/TASK.json. A task is a module in
-scripts/learning with its id, `signals` and `RULES`.
+The numbers of a rule are searched by CMA-ES, and agents (stable-baselines3's PPO)
+learn, for as many seconds of processor each, on episodes of their own. With `--on-rule`
+an agent adds to the rule's rudder. "Beyond" is what it costs more than the rule in the
+same episodes, with its 95 % interval.
 """
 
-from __future__ import annotations
-
 import argparse
-import importlib
 import time
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
-import cma
-import gymnasium
 import numpy as np
+import torch
+from encounter_rule import NUMBERS, EncounterRule
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.training.plan import make_plan
-from agents.training.training import train
+from agents.training.controller_search import SearchBudget, search
+from agents.training.controller_space import factor
+from agents.training.residual import ResidualVecEnv
 from shipgym.arrays import Floats
-from shipgym.files import make_folder, read_json, write_json
+from shipgym.envs.sb3 import ShipVecEnv
 
-FOLDER = Path(__file__).parents[1] / "build" / "learning_tasks"
-EPISODES, FIRST_SEED = 100, 900_000
-SEARCHED, SEARCH_SEED = 48, 1_000
-#: What learners share: rollouts small enough for many updates.
-PPO = {
-    "base": "none",
-    "ships": 32,
-    "n_steps": 128,
-    "batch_size": 256,
-    "n_epochs": 8,
-    "learning_rate": 7e-4,
-    "reward_scale": "running",
-    "total_steps": 393_216,
-    "evaluate_every": 49_152,
-}
-#: Learners: algorithm and settings.
-AGENTS: dict[str, tuple[str, dict[str, Any]]] = {
-    "PPO": ("ppo", PPO),
-    "PPO, 4 frames": ("ppo", {**PPO, "frame_stack": 4}),
-    "SAC": ("sac", {"base": "none", "total_steps": 50_000}),
-}
-Law = Callable[[Floats, Any], tuple[Floats, Any]]
+JUDGED, SEARCHED = 1_000_000, 500_000  # first seeds
+EPISODES = 100
+DT = 1.0  # s, interval of rudder-roll damping
 
 
-def costs(envs: Any, act: Law, seed: int) -> dict[str, Floats]:
-    """Cost of an episode in each row, and its parts; `act` takes observations."""
-    seen, _ = envs.reset(seed=seed)
-    found: dict[str, Floats] = {}
-    memory = None
-    ended = np.zeros(envs.num_envs, dtype=bool)
-    while not ended.all():
-        action, memory = act(seen, memory)
-        seen, _, terminated, truncated, info = envs.step(action)
-        for name, values in info.items():
-            if name == "cost" or name.startswith("reward_"):
-                part = values if name == "cost" else -values
-                found[name] = found.get(name, 0.0) + np.where(ended, 0.0, part)
-        ended = ended | terminated | truncated
-    return found
+class PD:
+    """Feedback of heading error, yaw rate and the integral of the error."""
 
+    numbers: Mapping[str, float] = {"error": 2.0, "rate": 2.0, "integral": 0.1}
 
-def steered(law: Law, envs: Any, signals: Callable[[Floats], Floats]) -> Law:
-    """Make a law of signals one of observations and commands."""
-    scales = envs.observation_scales
-    limit = scales[list(envs.observation_names).index("rudder")]
+    def __init__(self, names: Any, numbers: Mapping[str, float]) -> None:
+        self.numbers = numbers
 
-    def act(seen: Floats, memory: Any) -> tuple[Floats, Any]:
-        order, memory = law(signals(seen * scales), memory)
-        command = np.clip(order / limit, -1.0, 1.0)
-        return command[:, None].astype(np.float32), memory
-
-    return act
-
-
-def searched(task: Any, rule: Any, seconds: float, seed: int) -> tuple[Floats, int]:
-    """Best numbers of a rule, and how many candidates were tried."""
-    envs = gymnasium.make_vec(task.ID, num_envs=SEARCHED, autoreset_mode="Disabled")
-    start = np.array(rule.start)
-    search = cma.CMAEvolutionStrategy(
-        start, 0.5, {"seed": seed + 1, "verbose": -9, "maxiter": 100_000}
-    )
-    began = time.process_time()
-    generation = 0
-    while time.process_time() - began < seconds:
-        candidates = search.ask()
-        first = SEARCH_SEED + SEARCHED * (10 * seed + generation % 10)
-        found = []
-        for numbers in candidates:
-            act = steered(rule.make(numbers), envs, task.signals)
-            found.append(float(costs(envs, act, first)["cost"].mean()))
-        search.tell(candidates, found)
-        generation += 1
-    return search.result.xfavorite, generation * len(candidates)
-
-
-def learned(task: Any, name: str, seed: int) -> Law:
-    """Agent that has learned, as `costs` takes it."""
-    algorithm, settings = AGENTS[name]
-    policy = train(make_plan(algorithm, task.ID, seed=seed, settings=settings)).policy
-
-    def act(seen: Floats, memory: Any) -> tuple[Floats, Any]:
-        command, memory = policy.predict(seen, memory)
-        return command, memory
-
-    return act
-
-
-def compared(
-    task: Any, seeds: int, seconds: float, only: Sequence[str]
-) -> dict[str, Any]:
-    """Run what is not in the results yet: by name, one entry a seed."""
-    path = FOLDER / f"{task.__name__.rpartition('.')[2]}.json"
-    make_folder(path.parent)
-    found: dict[str, Any] = {}
-    if path.exists():
-        found = dict(read_json(path, "results", "remove it"))
-    envs = gymnasium.make_vec(task.ID, num_envs=EPISODES, autoreset_mode="Disabled")
-    for seed in range(seeds):
-        for name in only or (*task.RULES, *AGENTS):
-            runs = found.setdefault(name, [])
-            if len(runs) > seed:
-                continue
-            began = time.process_time()
-            about: dict[str, Any] = {}
-            if name in task.RULES:
-                rule = task.RULES[name]
-                numbers, candidates = searched(task, rule, seconds, seed)
-                about = {"numbers": numbers.tolist(), "candidates": candidates}
-                act = steered(rule.make(numbers), envs, task.signals)
-            else:
-                act = learned(task, name, seed)
-            about["processor_s"] = round(time.process_time() - began)
-            parts = costs(envs, act, FIRST_SEED)
-            about |= {part: values.tolist() for part, values in parts.items()}
-            runs.append(about)
-            write_json(found, path)
-            mean = float(np.mean(about["cost"]))
-            print(f"{name}, seed {seed}: {mean:.1f}", flush=True)
-    return found
-
-
-def interval(differences: Floats) -> tuple[float, float]:
-    """Mean of differences of shape (seeds, episodes), and half their 95 % interval.
-
-    Seeds and episodes are drawn again, as pairs.
-    """
-    random = np.random.default_rng(0)
-    n, m = differences.shape
-    means = []
-    for _ in range(2000):
-        rows = random.integers(n, size=n)
-        columns = random.integers(m, size=m)
-        means.append(differences[np.ix_(rows, columns)].mean())
-    low, high = np.quantile(means, [0.025, 0.975])
-    return float(differences.mean()), float(high - low) / 2.0
-
-
-def table(task: Any, found: dict[str, Any]) -> str:
-    """Costs by name, and their difference to the best rule, as Markdown."""
-    by_name = {
-        name: np.array([run["cost"] for run in runs]) for name, runs in found.items()
-    }
-    best = min(task.RULES, key=lambda name: by_name[name].mean())
-    fewest = min(len(rows) for rows in by_name.values())
-    lines = [
-        f"| entry, {fewest} seeds | cost | beyond {best} | processor, s |",
-        "| --- | --- | --- | --- |",
-    ]
-    for name, rows in by_name.items():
-        mean, half = interval(rows)
-        difference, apart = interval(rows[:fewest] - by_name[best][:fewest])
-        seconds = np.mean([run["processor_s"] for run in found[name]])
-        lines.append(
-            f"| {name} | {mean:.1f} ± {half:.1f} | {difference:+.1f} ± {apart:.1f}"
-            f" | {seconds:.0f} |"
+    def predict(self, seen: Any, *_: Any, **__: Any) -> tuple[Any, None]:
+        """Rudder for each ship."""
+        k = self.numbers
+        error = np.arctan2(seen[:, 0], seen[:, 1])
+        rudder = (
+            k["error"] * error - k["rate"] * seen[:, 2] + k["integral"] * seen[:, 7]
         )
-    return "\n".join(lines)
+        return np.clip(rudder, -1.0, 1.0)[:, None].astype(np.float32), None
+
+
+class RollDamping:
+    """PD on a smooth heading, and feedback of roll without its mean.
+
+    Roll is damped as far as it has grown: below three degrees it costs nothing
+    (automatic gain control: van Amerongen, van der Klugt & van Nauta Lemke 1990, Rudder
+    roll stabilization for ships, Automatica 26).
+    """
+
+    numbers: Mapping[str, float] = {
+        "error": 2.8,  # rudder by its limit for an error of 1 rad
+        "rate": 1.0,  # against a yaw rate of 1, in her length and speed
+        "roll": 0.4,
+        "roll_rate": 0.3,
+        "smooth": 1.0,  # s, of the heading
+        "slow": 20.0,  # s, of the mean of roll
+        "free": 0.5,  # deg, roll that is not damped
+        "width": 1.0,  # deg, until it is damped in full
+    }
+
+    def __init__(self, names: Any, numbers: Mapping[str, float]) -> None:
+        self.numbers = numbers
+
+    def predict(
+        self, seen: Any, state: Any = None, *_: Any, **__: Any
+    ) -> tuple[Any, Any]:
+        """Rudder for each ship; the state is what its filters have kept."""
+        k = self.numbers
+        error = np.arctan2(seen[:, 0], seen[:, 1])
+        roll = seen[:, 8]
+        now = np.stack([error, seen[:, 2], roll, np.zeros(len(seen))])
+        kept = now if state is None else state
+        times = np.array([k["smooth"], k["smooth"], k["slow"]])[:, None]
+        kept[:3] += DT / (DT + times) * (now[:3] - kept[:3])
+        kept[3] += DT / 20.0 * (roll**2 - kept[3])
+        level = 30.0 * np.sqrt(kept[3])  # deg
+        part = np.clip((level - k["free"]) / k["width"], 0.0, 1.0)
+        damping = k["roll"] * (roll - kept[2]) - k["roll_rate"] * seen[:, 9]
+        rudder = k["error"] * kept[0] - k["rate"] * kept[1] + part * damping
+        return np.clip(rudder, -1.0, 1.0)[:, None].astype(np.float32), kept
+
+
+class Task(NamedTuple):
+    """An environment, a rule for it, and the numbers from which a search begins."""
+
+    env: str
+    rule: Any
+    numbers: Mapping[str, float]
+
+
+TASKS = {
+    "rudder-roll": Task("shipgym/RudderRoll-v0", RollDamping, RollDamping.numbers),
+    "encounter": Task("shipgym/Encounter-v0", EncounterRule, NUMBERS),
+    "unknown-ship": Task("shipgym/UnknownShip-v0", PD, PD.numbers),
+}
+
+
+class Judged(NamedTuple):
+    """How the episodes of a policy ended, shape (n,) each."""
+
+    costs: Floats
+    success: Floats
 
 
 def main() -> None:
-    """Compare, and print the table."""
+    """Search, learn and print the table."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument("task", help="module of scripts/learning")
-    parser.add_argument("--seeds", type=int, default=5)
-    parser.add_argument("--seconds", type=float, default=240.0, help="of a search")
-    parser.add_argument("--only", nargs="+", default=(), help="rules and agents")
-    parser.add_argument("--table", action="store_true", help="of what was found")
+    parser.add_argument("task", choices=list(TASKS))
+    parser.add_argument("--seconds", type=float, default=60.0, help="of an agent")
+    parser.add_argument("--search", type=float, help="seconds; as long by default")
+    parser.add_argument("--seeds", type=int, default=1, help="agents; 0: none")
+    parser.add_argument("--frames", type=int, default=1, help="observations shown")
+    parser.add_argument("--on-rule", action="store_true")
     given = parser.parse_args()
-    task = importlib.import_module(f"learning.{given.task}")
-    seeds = 0 if given.table else given.seeds
-    print(table(task, compared(task, seeds, given.seconds, given.only)))
+    torch.set_num_threads(1)
+    task = TASKS[given.task]
+    ships = ShipVecEnv(task.env, EPISODES, seed=JUDGED)
+    rule = rule_of(task, ships)
+    print("| | cost | beyond | success |\n| --- | ---: | ---: | ---: |")
+    best = show("rule, set by hand", judged(rule, ships))
+    seconds = given.seconds if given.search is None else given.search
+    if seconds:
+        rule = searched(task, seconds)
+        ships.seed(JUDGED)
+        best = show(f"rule, {seconds:.0f} s", judged(rule, ships))
+    for seed in range(given.seeds):
+        options = {"frame_stack": given.frames}
+        if given.on_rule:
+            options |= {"base": rule, "authority": 0.5}
+        agent = learned(task, seed, given.seconds, options)
+        ships.seed(JUDGED)
+        run = judged(agent, ResidualVecEnv(ships, **options))
+        show(f"PPO, seed {seed}, {agent.num_timesteps} steps", run, best)
+
+
+def rule_of(task: Task, ships: Any, numbers: Mapping[str, float] | None = None) -> Any:
+    """The rule of a task with some numbers."""
+    (names,) = ships.get_attr("observation_names", 0)
+    return task.rule(names, numbers or task.numbers)
+
+
+def judged(policy: Any, ships: Any) -> Judged:
+    """One episode of each ship."""
+    seen = ships.reset()
+    costs = np.full(ships.num_envs, np.nan)
+    success = np.zeros(ships.num_envs)
+    state = None
+    starts = np.ones(ships.num_envs, dtype=bool)
+    while np.isnan(costs).any():
+        actions, state = policy.predict(seen, state, starts, deterministic=True)
+        seen, _, starts, infos = ships.step(actions)
+        for row in np.flatnonzero(starts & np.isnan(costs)):
+            costs[row] = infos[row]["episode"]["cost"]
+            success[row] = infos[row]["is_success"]
+    return Judged(costs, success)
+
+
+def show(name: str, run: Judged, best: Judged | None = None) -> Judged:
+    """Print a row of the table."""
+    beyond = "" if best is None else interval(run.costs - best.costs)
+    success = f"{100.0 * run.success.mean():.0f} %"
+    print(f"| {name} | {interval(run.costs)} | {beyond} | {success} |", flush=True)
+    return run
+
+
+def interval(numbers: Floats) -> str:
+    """Mean and half of its 95 % interval."""
+    half = 1.96 * numbers.std(ddof=1) / np.sqrt(len(numbers))
+    return f"{numbers.mean():.1f} ± {half:.1f}"
+
+
+def searched(task: Task, seconds: float) -> Any:
+    """The rule with numbers that a search finds on 48 episodes."""
+    ships = ShipVecEnv(task.env, 48)
+
+    def costs(candidates: Any) -> Floats:
+        found = []
+        for numbers in candidates:
+            ships.seed(SEARCHED)
+            found.append(judged(rule_of(task, ships, numbers), ships).costs.mean())
+        return np.array(found)
+
+    space = [factor(name, start, step=0.5) for name, start in task.numbers.items()]
+    found = search(costs, space, SearchBudget(seconds=seconds))
+    return rule_of(task, ships, found.mean)
+
+
+def learned(task: Task, seed: int, seconds: float, options: dict[str, Any]) -> PPO:
+    """An agent after so many seconds of processor."""
+    ships = ResidualVecEnv(ShipVecEnv(task.env, 64, seed=1000 * seed), **options)
+    scaled = VecNormalize(ships, norm_obs=False, gamma=0.99)
+    began = time.process_time()
+
+    def rate(_: float) -> float:
+        used = (time.process_time() - began) / seconds
+        return 5e-4 * max(1.0 - used, 0.05)
+
+    agent = PPO(
+        "MlpPolicy",
+        scaled,
+        rate,
+        n_steps=128,
+        batch_size=1024,
+        n_epochs=5,
+        seed=seed,
+        policy_kwargs={"log_std_init": -1.0},
+    )
+    return agent.learn(10**9, lambda *_: time.process_time() - began < seconds)
 
 
 if __name__ == "__main__":

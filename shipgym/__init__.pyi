@@ -1,6 +1,5 @@
 from . import manoeuvres as manoeuvres
 from . import plots as plots
-from .envs.checker import check_vector_env as check_vector_env
 from .envs.episode import Episode as Episode
 from .envs.recording import RecordEpisode as RecordEpisode
 from .envs.registration import register_task as register_task

@@ -64,7 +64,7 @@ def sail_between(state: Any, ships: Any, offsets: Any, begin: Any, end: Any) -> 
     wind = mean_push(first.wind, last.wind)
     for lane in range(LANES):
         own = load_ship(ships, lane)
-        ship = with_gear(own, NO_LIMIT, rate)
+        ship = with_gear(own, NO_LIMIT, rate, 0.0)
         coefficients = load_coefficients(ships, lane)
         rudder = last.rudder + offsets[lane]
         motion = load_motion(state, lane)

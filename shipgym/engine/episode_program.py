@@ -68,7 +68,6 @@ class EpisodeProgram:
         return Layout(
             outcome=Outcome,
             reward=self.task.Reward,
-            reported=(self.task.State, self.task.stored),
             observation=self.task.Observation,
             **(stages.BETWEEN_STAGES if self.ship.staged else {}),
         )
@@ -108,12 +107,12 @@ class EpisodeProgram:
         raise KeyError(name)
 
     def info_row(self, name: str) -> int:
-        """Row of an entry of `info` among the results."""
+        """Row of an entry of `info` among the results, and the states behind them."""
         rows = self.result_rows
         part = name.removeprefix("reward_")
         constraint = name.removeprefix(CONSTRAINT)
         if name in self.task.reported or constraint != name:
-            return rows["reported"].row(constraint)
+            return rows.n_rows + self.state_rows["task_state"].row(constraint)
         if name in Outcome._fields or part == "end":
             return rows["outcome"].row(part)
         parts = self.task.reward_names

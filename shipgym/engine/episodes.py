@@ -29,6 +29,7 @@ from shipgym.engine.hooks import (
     store_random,
     store_sea,
     store_sea_random,
+    store_task_state,
     task_begin,
 )
 from shipgym.engine.judging import (
@@ -37,7 +38,6 @@ from shipgym.engine.judging import (
     observe_lane,
     sample,
     settings_of,
-    store_task,
     take_events,
 )
 from shipgym.engine.lane_records import Commands, Random, SeaRandom
@@ -176,7 +176,7 @@ def begin_lane(tile: Tile, lane: int) -> None:
     )
     store_motion(state, lane, motion)
     store_commands(state, lane, commands)
-    store_task(tile, lane, task_state)
+    store_task_state(state, lane, task_state)
     if HAS_SEA:
         begin_sea_of(tile, lane, motion, random)
 

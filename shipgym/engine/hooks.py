@@ -38,7 +38,6 @@ load_task_state = store_task_state = given  # `State` of the task
 # of a control interval, in the room for results
 load_outcome = store_outcome = given  # `Outcome`
 store_reward = given  # `Reward` of the task
-store_reported = given  # fields of the task's `State` that `info` has
 # store_observation(array, lane, record, scale): times `scale`, clipped to its bounds
 store_observation = given
 no_reward = given  # () -> `Reward` of zeros

@@ -36,7 +36,6 @@ from shipgym.engine.hooks import (
     store_memory,
     store_observation,
     store_outcome,
-    store_reported,
     store_reward,
     store_task_state,
     task_step,
@@ -46,6 +45,7 @@ from shipgym.engine.hooks import (
 from shipgym.engine.lane_records import EpisodeCounters, Interval, Outcome, Rules
 from shipgym.engine.mathematics import pick
 from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.record_code import changer
 from shipgym.engine.specialise import called
 from shipgym.engine.tiles import (
     FIRST_LANE,
@@ -58,6 +58,9 @@ from shipgym.engine.tiles import (
 # Set when a loop is compiled, like hooks: whether users' functions may fail. They are
 # then not asked about ships that are over, which may be beyond what they expect.
 MAY_FAIL = False
+
+
+judged = changer(EpisodeCounters, "ended", "episode_cost")
 
 
 class LaneView(NamedTuple):
@@ -182,16 +185,15 @@ def judge(
     outcome = outcome_of(interval, counters, failed, arrived, earned, settings)
 
     just_ended = outcome.terminated + outcome.truncated > 0.0
-    counters = EpisodeCounters(
-        steps=counters.steps,
-        ended=pick(just_ended, 1.0, counters.ended),
-        ran_away=counters.ran_away,
-        episode_cost=counters.episode_cost + outcome.cost,
+    counters = judged(
+        counters,
+        pick(just_ended, 1.0, counters.ended),
+        counters.episode_cost + outcome.cost,
     )
     store_counters(tile.state, lane, counters)
     store_outcome(tile.result, lane, outcome)
     store_reward(tile.result, lane, reward)
-    store_task(tile, lane, task_state)
+    store_task_state(tile.state, lane, task_state)
     return task_state, just_ended
 
 
@@ -214,7 +216,7 @@ def outcome_of(
     lost = failed | (interval.envelope_distance > rules.largest_distance)
     wrecked = going * pick(lost, 1.0, counters.ran_away)
     terminated = max(wrecked, going * pick(arrived, 1.0, 0.0))
-    late = pick(counters.steps >= rules.time_limit, going, 0.0)
+    late = pick(counters.steps >= rules.cut_off, going, 0.0)
     steps_left = rules.time_limit - counters.steps
     seen_steps = min(steps_left, rules.loss_horizon)
     worst = worst_cost(settings.task)
@@ -239,12 +241,6 @@ def bounded_reward(cost: float, rules: Rules) -> float:
     """Reward of an interval with a cost: from that of no cost to one less."""
     scale = max(rules.half_reward_cost, 1e-300)  # 0 where this is not used
     return rules.perfect_step - cost / (scale + fabs(cost))
-
-
-def store_task(tile: Tile, lane: int, task_state: Any) -> None:
-    """Store the state of the task, and report the fields that users see."""
-    store_task_state(tile.state, lane, task_state)
-    store_reported(tile.result, lane, task_state)
 
 
 def sample(
@@ -278,7 +274,7 @@ def take_events(tile: Tile) -> None:
             random = load_random(tile.random, lane)
             plan = plan_of(state, lane)
             after = on_event(motion, before, interval, ship, settings, random, plan)
-            store_task(tile, lane, after)
+            store_task_state(tile.state, lane, after)
             observe_lane(tile, lane)
 
 

@@ -11,6 +11,7 @@ class Rules(NamedTuple):
     dt: float  # s, control interval
     substeps: float  # of the integration in it
     time_limit: float  # control intervals
+    cut_off: float  # control intervals after which an episode is truncated
     largest_distance: float  # from the data of the model at which an episode ends
     least_shaft: float  # least command of the shaft, part of service speed
     half_reward_cost: float  # that halves a bounded reward; 0 where it has no bounds

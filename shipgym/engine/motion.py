@@ -8,6 +8,7 @@ from math import fabs
 from typing import Any, NamedTuple
 
 from shipgym.engine.mathematics import clip, sin_cos, small_cosine, turn_sin_cos
+from shipgym.engine.record_code import changer
 
 # Features of ship, gear and sea. Set when a loop is compiled, like hooks, so that
 # absent ones cost nothing.
@@ -33,6 +34,10 @@ class Motion(NamedTuple):
     q: float  # rad/s^2, memory of yaw, part of its acceleration
     delta: float  # rad, rudder, positive to starboard
     n: float  # 1/s, shaft
+
+
+at = changer(Motion, "x", "y", "psi", "n")
+moving = changer(Motion, "u", "v")
 
 
 class Ship(NamedTuple):
@@ -240,19 +245,7 @@ def start_of_step(motion: Motion, shaft: float) -> Motion:
 
     A shaft without a speed of its own among the states turns as commanded.
     """
-    return Motion(
-        x=0.0,
-        y=0.0,
-        psi=0.0,
-        u=motion.u,
-        v=motion.v,
-        r=motion.r,
-        p=motion.p,
-        phi=motion.phi,
-        q=motion.q,
-        delta=motion.delta,
-        n=motion.n if HAS_SHAFT else shaft,
-    )
+    return at(motion, 0.0, 0.0, 0.0, motion.n if HAS_SHAFT else shaft)
 
 
 def end_of_step(
@@ -276,19 +269,7 @@ def end_of_step(
     if HAS_SEA:
         x = x + h * held.push.north
         y = y + h * held.push.east
-    return Motion(
-        x=x,
-        y=y,
-        psi=motion.psi + moved.psi,
-        u=moved.u,
-        v=moved.v,
-        r=moved.r,
-        p=moved.p,
-        phi=moved.phi,
-        q=moved.q,
-        delta=moved.delta,
-        n=moved.n,
-    )
+    return at(moved, x, y, motion.psi + moved.psi, moved.n)
 
 
 def sail(
@@ -324,19 +305,7 @@ def in_other_water(motion: Motion, north: float, east: float) -> Motion:
     sine, cosine = sin_cos(motion.psi)
     ahead = north * cosine + east * sine
     aside = east * cosine - north * sine
-    return Motion(
-        x=motion.x,
-        y=motion.y,
-        psi=motion.psi,
-        u=motion.u - ahead,
-        v=motion.v - aside / upright(motion),
-        r=motion.r,
-        p=motion.p,
-        phi=motion.phi,
-        q=motion.q,
-        delta=motion.delta,
-        n=motion.n,
-    )
+    return moving(motion, motion.u - ahead, motion.v - aside / upright(motion))
 
 
 def lost(motion: Motion, ship: Ship) -> bool:

@@ -24,7 +24,7 @@ import hashlib
 import linecache
 import re
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -42,6 +42,7 @@ from shipgym.engine.records import (
 )
 
 Function = Callable[..., Any]
+R = TypeVar("R", bound=tuple[Any, ...])
 
 
 def loader(rows: Rows, lanes: int = LANES) -> Function:
@@ -118,6 +119,19 @@ def summed(record: Record) -> Function:
     terms = [_part("record", path) for path in leaves(record)]
     body = [f"return {' + '.join(terms)}"]
     return written(f"total_{record.__name__}", "record", body, {})
+
+
+def changer(record: type[R], *fields: str) -> Callable[..., R]:
+    """Write `change(record, FIELDS)`: the record with other values of some fields.
+
+    `changer(Fix, "north")` is `lambda record, north: Fix(north, record.east)`.
+    """
+    known: Any = record
+    made = [one if one in fields else f"record.{one}" for one in known._fields]
+    name = record.__name__
+    arguments = ", ".join(["record", *fields])
+    body = [f"return {name}({', '.join(made)})"]
+    return written(f"change_{name}", arguments, body, {name: record})
 
 
 def _part(record: str, path: str) -> str:

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 import numpy as np
 
 from shipgym.checks import check_whole
+from shipgym.errors import InputError
 
 LANES = 64
 
@@ -145,8 +146,14 @@ def short_names(record: Record) -> dict[str, str]:
     of `range.0`.
     """
     kinds = Counter(_records_within(record))
-    names = _short_names(record, "", kinds)
-    return dict(zip(leaves(record), names, strict=True))
+    names = dict(zip(leaves(record), _short_names(record, "", kinds), strict=True))
+    for name, times in Counter(names.values()).items():
+        if times > 1:
+            raise InputError(
+                f"{record.__name__}: expected names that differ, got {times} fields"
+                f" {name!r}"
+            )
+    return names
 
 
 def _records_within(kind: Any) -> Iterator[Record]:

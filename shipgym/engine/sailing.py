@@ -43,8 +43,11 @@ from shipgym.engine.motion import (
     sail,
 )
 from shipgym.engine.random import EVOLVE_WORDS
+from shipgym.engine.record_code import changer
 from shipgym.engine.specialise import called
 from shipgym.engine.tiles import FIRST_LANE, GROUP, SHARED_SHIP, Tile
+
+counted = changer(EpisodeCounters, "steps", "ran_away")
 
 
 def are_finite(actions: Any) -> bool:
@@ -82,12 +85,7 @@ def take_commands(tile: Tile, actions: Any, n_ships: int) -> None:
             shaft_command=pick(keeps_shaft, held.shaft_command, shaft),
             rudder_before=motion.delta,
         )
-        counters = EpisodeCounters(
-            steps=before.steps + (1.0 - before.ended),
-            ended=before.ended,
-            ran_away=0.0,
-            episode_cost=before.episode_cost,
-        )
+        counters = counted(before, before.steps + (1.0 - before.ended), 0.0)
         store_commands(state, lane, commands)
         store_counters(state, lane, counters)
 
@@ -135,12 +133,8 @@ def end_substep(tile: Tile, lane: int, after: Motion, h: float, ship: Ship) -> N
         after = in_local_water(tile, lane, before, after, h)
 
     motion = pick(away | over, before, after)
-    counters = EpisodeCounters(
-        steps=counters.steps,
-        ended=counters.ended,
-        ran_away=pick(away, 1.0, counters.ran_away),
-        episode_cost=counters.episode_cost,
-    )
+    ran_away = pick(away, 1.0, counters.ran_away)
+    counters = counted(counters, counters.steps, ran_away)
     if HAS_SEA:
         evolve_sea(tile, lane, motion, h, over)
     store_motion(state, lane, motion)

@@ -145,19 +145,7 @@ def _check_kind(kind: Any, name: str, place: str) -> None:
         for entry in dict.fromkeys(get_args(kind)):
             _check_kind(entry, name, place)
     elif is_list(kind):
-        raise not_of_numbers(place, kind)
-
-
-def not_of_numbers(place: str, kind: Any) -> InputError:
-    """Make the error for a field that is neither a number nor made of numbers."""
-    is_array_of_any_size = get_origin(kind) in (tuple, list, np.ndarray)
-    if kind in (tuple, list, np.ndarray) or is_array_of_any_size:
-        expected = (
-            "an array of a fixed size, as tuple[float, float] or"
-            " Annotated[tuple[float, ...], Size(8)]"
-        )
-        return unexpected(place, expected, kind)
-    return unexpected(place, "a float", kind)
+        raise unexpected(place, "a float, or an array of a fixed size", kind)
 
 
 def field_place(record: Any, field: str, where: str) -> str:
@@ -268,11 +256,8 @@ def _setting_of(kind: Any, value: Any, name: str, bounds: Setting) -> Any:
         return checked_setting(value, name, bounds)
     article = "number" if is_array(kind) else "the"
     labels = [f"{article} {part}" for part, _ in parts]
-    is_sequence = isinstance(value, Sequence | np.ndarray)
-    if not is_sequence or isinstance(value, str) or len(value) != len(parts):
-        expected = " and ".join(labels)
-        if is_array(kind):
-            expected = f"{len(parts)} numbers, or lists of numbers, in a list"
+    if not isinstance(value, list | tuple | np.ndarray) or len(value) != len(parts):
+        expected = f"{len(parts)} numbers in a list: {' and '.join(labels)}"
         raise unexpected(name, expected, value)
 
     made = []

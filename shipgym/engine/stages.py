@@ -36,6 +36,7 @@ from shipgym.engine.motion import (
     stage,
     start_of_step,
 )
+from shipgym.engine.record_code import changer
 from shipgym.engine.sailing import end_substep, push_of, ship_of
 from shipgym.engine.specialise import called
 from shipgym.engine.tiles import FIRST_LANE, GROUP, SHARED_SHIP, Tile
@@ -46,6 +47,7 @@ N_ROWS = 0  # of the table that is summed over, a multiple of 4; set by the ship
 #: Part of the step at which a stage lies, and its weight.
 STAGES = ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0))
 NO_SUMS = Sums(0.0, 0.0, 0.0)
+with_accelerations = changer(Rates, "u", "v", "r")
 #: Records between the loops, by the names of `shipgym.engine.hooks`.
 BETWEEN_STAGES = {"point": Point, "sums": Sums, "slope": Rates, "slopes": Rates}
 
@@ -130,24 +132,9 @@ def end_stage(tile: Tile, reach: float, weight: float, groups: int) -> None:
         slope = rates(motion, held, coefficients, ship)
         sums = load_sums(tile.result, lane)
         udot, vdot, rdot = sum_accelerations(motion, sums, ship)
-        slope = with_accelerations(slope, udot, vdot, rdot)
+        slope = with_accelerations(
+            slope, slope.u + udot, slope.v + vdot, slope.r + rdot
+        )
         slopes = load_slopes(tile.result, lane)
         store_slope(tile.result, lane, slope)
         store_slopes(tile.result, lane, add_rates(slopes, weight, slope))
-
-
-def with_accelerations(k: Rates, udot: float, vdot: float, rdot: float) -> Rates:
-    """Rates with more accelerations in surge, sway and yaw."""
-    return Rates(
-        x=k.x,
-        y=k.y,
-        psi=k.psi,
-        u=k.u + udot,
-        v=k.v + vdot,
-        r=k.r + rdot,
-        p=k.p,
-        phi=k.phi,
-        q=k.q,
-        delta=k.delta,
-        n=k.n,
-    )

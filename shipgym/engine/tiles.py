@@ -49,8 +49,8 @@ class OutputTables(NamedTuple):
     outcomes: Any  # float64 (n_outcomes * n_ships,)
     flags: Any  # bool (n_flags * n_ships,)
     observed: Any  # int64 (n_observations,): entries of results where rows begin
-    informed: Any  # int64 (n_outcomes,)
-    flagged: Any  # int64 (n_flags,)
+    informed: Any  # int64 (n_outcomes,): or of results and the states behind them
+    flagged: Any  # int64 (n_flags,): rows of outcomes
     n_ships: int
 
 
@@ -94,9 +94,6 @@ def write_outputs(tile: Tile, outputs: OutputTables, begin: int, end: int) -> No
     first = tile.first
     result = tile.result
     observations = outputs.observations
-    outcomes = outputs.outcomes
-    flags = outputs.flags
-    n_ships = outputs.n_ships
     width = len(outputs.observed)
     for column in range(width):
         source = outputs.observed[column]
@@ -105,16 +102,27 @@ def write_outputs(tile: Tile, outputs: OutputTables, begin: int, end: int) -> No
             entry = np.uintp(target + lane * width)
             observations[entry] = result[np.uintp(source + lane)]
 
+    n_results = len(result)
     for row in range(len(outputs.informed)):
         source = outputs.informed[row]
-        target = first + row * n_ships
-        for lane in range(begin, end):
-            entry = np.uintp(target + lane)
-            outcomes[entry] = result[np.uintp(source + lane)]
+        target = first + row * outputs.n_ships
+        if source < n_results:
+            copy_row(outputs.outcomes, target, result, source, begin, end)
+        else:
+            source -= n_results
+            copy_row(outputs.outcomes, target, tile.state, source, begin, end)
 
     for row in range(len(outputs.flagged)):
-        source = outputs.flagged[row]
-        target = first + row * n_ships
+        source = first + outputs.flagged[row] * outputs.n_ships
+        target = first + row * outputs.n_ships
         for lane in range(begin, end):
-            entry = np.uintp(target + lane)
-            flags[entry] = result[np.uintp(source + lane)] > 0.0
+            number = outputs.outcomes[np.uintp(source + lane)]
+            outputs.flags[np.uintp(target + lane)] = number > 0.0
+
+
+def copy_row(
+    outcomes: Any, target: int, rows: Any, source: int, begin: int, end: int
+) -> None:
+    """Copy a row of some lanes into the outcomes."""
+    for lane in range(begin, end):
+        outcomes[np.uintp(target + lane)] = rows[np.uintp(source + lane)]

@@ -42,6 +42,7 @@ from shipgym.engine.motion import (
     sail,
 )
 from shipgym.engine.random import BEGIN_WORDS, EVOLVE_WORDS
+from shipgym.engine.record_code import changer
 
 NO_LIMIT = 1e300  # of a measured rudder, rad
 
@@ -49,49 +50,10 @@ NO_LIMIT = 1e300  # of a measured rudder, rad
 SEA_CHANNELS = SeaChannels._fields
 
 
-def with_gear(ship: Ship, limit: float, rate: float) -> Ship:
-    """Return the ship with another steering gear, without lag."""
-    return Ship(
-        length=ship.length,
-        speed=ship.speed,
-        rudder_limit=limit,
-        rudder_rate=rate,
-        gear_frequency=0.0,
-        shaft=ship.shaft,
-        water_depth=ship.water_depth,
-        scale_speed=ship.scale_speed,
-    )
-
-
-def in_depth(ship: Ship, water_depth: float) -> Ship:
-    """Return the ship in water of another depth."""
-    return Ship(
-        length=ship.length,
-        speed=ship.speed,
-        rudder_limit=ship.rudder_limit,
-        rudder_rate=ship.rudder_rate,
-        gear_frequency=ship.gear_frequency,
-        shaft=ship.shaft,
-        water_depth=water_depth,
-        scale_speed=ship.scale_speed,
-    )
-
-
-def replaced(motion: Motion, psi: float, delta: float, n: float) -> Motion:
-    """Return a state with another heading, rudder angle and shaft speed."""
-    return Motion(
-        x=motion.x,
-        y=motion.y,
-        psi=psi,
-        u=motion.u,
-        v=motion.v,
-        r=motion.r,
-        p=motion.p,
-        phi=motion.phi,
-        q=motion.q,
-        delta=delta,
-        n=n,
-    )
+#: (ship, rudder_limit, rudder_rate, gear_frequency)
+with_gear = changer(Ship, "rudder_limit", "rudder_rate", "gear_frequency")
+in_depth = changer(Ship, "water_depth")
+replaced = changer(Motion, "psi", "delta", "n")
 
 
 def push_now(motion: Motion, sea: Any, parameters: Any) -> Push:
@@ -105,9 +67,10 @@ def sample_sea(out: Any, sea: Any, rng_state: Any, parameters: Any) -> None:
     if HAS_SEA:
         p = load_sea_parameters(parameters)
         motion = load_motion(out[0])
-        begun = begin_sea(motion, rng_state[0], p)
+        word = rng_state[0]
+        begun = begin_sea(motion, word, p)
         store_sea(sea, 0, begun)
-        rng_state[0] += BEGIN_WORDS
+        rng_state[0] = word + BEGIN_WORDS
         record_sea(out, 0, sea, parameters)
 
 
@@ -245,7 +208,7 @@ def open_loop(
         steps = int(ceil(interval / longest_step - 1e-9))
         h = interval / steps
         rate = fabs(rudder - delta[i]) / interval
-        ship = with_gear(own, NO_LIMIT, rate)
+        ship = with_gear(own, NO_LIMIT, rate, 0.0)
         pushed = push_of_wind(load_wind(wind[i]))
 
         for k in range(steps):

@@ -58,6 +58,9 @@ class Engine(Lanes):
         Makes the loop that steps the ships; by default it is compiled.
     scale_task : Task, optional
         Task that gives the scales of observations; by default `task`.
+    cut_off : float
+        Control intervals after which an episode is truncated, if earlier than by the
+        task.
     """
 
     def __init__(
@@ -70,6 +73,7 @@ class Engine(Lanes):
         threads: int = 1,
         loop: Callable[[EpisodeProgram], Any] | None = None,
         scale_task: Task | None = None,
+        cut_off: float = np.inf,
     ) -> None:
         check_whole(num_envs, "num_envs", at_least=1)
         check_whole(threads, "threads", at_least=1)
@@ -88,6 +92,7 @@ class Engine(Lanes):
             allow_unstable=allow_unstable,
             threads=threads,
             scale_task=scale_task,
+            cut_off=cut_off,
         )
         randomisation = randomisation or Randomisation()
         self.pool = randomisation.ships(model, task.seas)
@@ -109,10 +114,8 @@ class Engine(Lanes):
             len(own) == 1,
             task.checked,
         )
-        contents = Contents(own, drawn, scale_task)
+        contents = Contents(own, drawn, scale_task, cut_off)
         super().__init__(program, model, task, num_envs, contents, threads)
-        # other ships are looked after behind each step
-        self._is_watched = bool(task.definition.targets)
         self._begin_all(loop or self._compiled)
 
     def _begin_all(self, loop: Callable[[EpisodeProgram], Any]) -> None:
@@ -198,7 +201,7 @@ class Engine(Lanes):
         step: Callable[[], int] = partial(self._run_shares, asked)
         if self.n_shares == 1:
             step = partial(self._run, self._memory, self.outputs.memory, 0, asked)
-        n_ended = self._watched(step) if self._is_watched else step()
+        n_ended = step()
         if n_ended < 0:  # `REFUSED`, in every share
             self.outputs = before
             self._refuse_orders()
@@ -235,15 +238,7 @@ class Engine(Lanes):
         The step returns the number of episodes that ended, or
         `shipgym.engine.episodes.REFUSED`.
         """
-        step = partial(self._run, self._memory, self.outputs.memory, 0, STEP)
-        return partial(self._watched, step) if self._is_watched else step
-
-    def _watched(self, step: Callable[[], int]) -> int:
-        """Take a step of a task with other ships, and look after them."""
-        n_ended = step()
-        if n_ended >= 0:
-            self.refuse_lost_targets()
-        return n_ended
+        return partial(self._run, self._memory, self.outputs.memory, 0, STEP)
 
     def reset(self, seeds: ArrayLike) -> Observation:
         """Begin in each lane the episode of the single environment's `reset(seed=...)`.

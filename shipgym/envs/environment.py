@@ -18,6 +18,7 @@ from shipgym.checks import (
     check_choice,
     check_flag,
     check_keys,
+    check_whole,
     did_you_mean,
     quoted,
     unexpected,
@@ -40,6 +41,8 @@ Space = (
 DEFAULT_MODEL = "mariner-tls-svm"
 DEFAULT_TASK = "CourseKeeping"
 LONGEST = "max_episode_steps"  # keyword of vector environments
+#: Attributes that a copy has besides its arguments and the state of its engine.
+KEPT = ("_keys", "_frames", "_over", "_some_over")
 PACE = ("action_repeat", "rate_limit", "frame_stack")  # keywords that make a `Pace`
 
 
@@ -192,6 +195,9 @@ class ShipsEnv:
                 " has one with roll=True"
             )
         num_envs = given.get("num_envs", 1)
+        longest = given.get(LONGEST) or -1
+        if longest != -1:
+            longest = check_whole(longest, LONGEST, at_least=1)
         self._own_engine = Engine(
             self.model,
             num_envs,
@@ -199,6 +205,7 @@ class ShipsEnv:
             self.randomisation,
             allow_unstable=given["allow_unstable"],
             threads=given.get("threads", 1),
+            cut_off=np.inf if longest == -1 else longest * self.pace.action_repeat,
         )
         self._asked: dict[str, Any] = {}
         self._artists = [] if mode is None else _artists(mode, num_envs)
@@ -288,46 +295,27 @@ class ShipsEnv:
                 attributes[name] = value
         state = None
         if self._begun:
-            state = self._state()
+            kept = {name: getattr(self, name, None) for name in KEPT}
+            engine_state = self._engine.get_state()
+            state = (self._asked, engine_state, kept)
         return rebuild, (type(self), self._arguments, state, attributes)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Any:
         _, (kind, arguments, state, attributes) = self.__reduce__()
         return rebuild(kind, arguments, state, copy.deepcopy(attributes, memo))
 
-    def _counters(self) -> dict[str, Any]:
-        """Numbers that a copy has in addition to the engine's."""
-        keys = np.array(self._keys)
-        counters = {"row_keys": keys}
-        if self._frames is not None:
-            counters["frames"] = self._frames.shown
-        return counters
-
-    def _state(self) -> dict[str, Any]:
-        """Episodes, their random numbers and the outputs of the last step."""
-        return {
-            "asked": self._asked,
-            "engine": self._engine.get_state(),
-            **self._counters(),
-        }
-
-    def _continue(self, state: Mapping[str, Any]) -> None:
+    def _continue(
+        self, asked: dict[str, Any], engine_state: Any, kept: dict[str, Any]
+    ) -> None:
         """Continue from the state of an environment with the same arguments."""
         self._begun = True
-        asked = dict(state["asked"])
-        self._asked = asked
+        self._asked = dict(asked)
         engine = self._engine_for(asked)
-        engine.set_state(state["engine"])
+        engine.set_state(engine_state)
         self._use(engine)
-        self._recall(state)
+        vars(self).update(copy.deepcopy(kept))
         for artist in self._artists:
             artist.begin(engine)
-
-    def _recall(self, counters: Mapping[str, Any]) -> None:
-        """Restore the numbers of `_counters`."""
-        self._keys = counters["row_keys"].copy()
-        if self._frames is not None:
-            self._frames.shown = counters["frames"].copy()
 
     def _engine_for(self, asked: Mapping[str, Any]) -> Engine:
         """Return the engine, or one with other settings or a certain ship."""
@@ -351,10 +339,10 @@ class ShipsEnv:
             self._asked = asked
 
     def _refuse_step(self) -> NoReturn:
-        """Raise the InputError of an environment that was not reset, or is closed."""
+        """Raise the InputError of an environment in which no episode goes on."""
         raise InputError(
-            "step: no episode has begun, or the environment was closed; call reset"
-            " first"
+            "step: no episode has begun, it is over, or the environment was closed;"
+            " call reset first"
         )
 
     def _warn_of_no_mode(self) -> None:
@@ -399,5 +387,5 @@ def rebuild(
     env = kind(**arguments)
     vars(env).update(attributes)
     if state is not None:
-        env._continue(state)
+        env._continue(*state)
     return env

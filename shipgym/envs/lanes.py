@@ -15,9 +15,7 @@ from shipgym.engine.motion import Ship
 from shipgym.engine.records import LANES, flat, leaves
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES, OutputPool, Outputs
 from shipgym.envs.randomisation import Pool
-from shipgym.errors import InputError
 from shipgym.models import ShipModel
-from shipgym.python_files import place_of
 from shipgym.sea.weather_column import weather_column
 from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.shapes import Shape, shapes_of
@@ -31,6 +29,7 @@ class Contents(NamedTuple):
     own: Pool
     drawn: bool  # whether each episode draws a ship and a sea of a pool
     scale_task: Task  # that gives the scales of observations
+    cut_off: float  # control intervals after which episodes are truncated
 
 
 class Lanes:
@@ -74,7 +73,7 @@ class Lanes:
         self.n_shares = len(shares)
         tables = self._allocate(
             **self._filled_tables(contents, n_tiles),
-            settings=np.array([self._settings()]),
+            settings=np.array([self._settings(contents.cut_off)]),
             shares=shares,
             **self._empty_tables(n_tiles),
             **self._output_rows(),
@@ -97,7 +96,7 @@ class Lanes:
 
     def _filled_tables(self, contents: Contents, n_tiles: int) -> dict[str, Floats]:
         """Tables of ships, of their pool, and of settings of the task."""
-        own, drawn, scale_task = contents
+        own, drawn, scale_task, _ = contents
         columns = ship_columns(
             own, self.windy, self.task, self.model, drawn, scale_task
         )
@@ -143,13 +142,14 @@ class Lanes:
             tables[name] = table
         return tables
 
-    def _settings(self) -> list[float]:
+    def _settings(self, cut_off: float) -> list[float]:
         """Settings of engine and sensor set, one after another."""
         task = self.task
         rules = Rules(
             dt=self.dt,
             substeps=task.substeps(self.model),
             time_limit=task.episode_steps,
+            cut_off=min(cut_off, task.episode_steps),
             largest_distance=task.max_envelope_distance,
             least_shaft=task.least_shaft(self.model),
             half_reward_cost=task.half_reward_cost,
@@ -172,11 +172,12 @@ class Lanes:
         outcomes = ("reward", "terminated", "truncated")
         answer = [rows["outcome"].row(name) for name in outcomes]
         info = [self.program.info_row(name) for name in self.task.info_names]
-        flags = [self.program.info_row(name) for name in self.flag_names]
+        names = (*outcomes, *self.task.info_names)
+        flags = [*outcomes[1:], *self.flag_names]
         return {
             "observed": _first_entries(observed),
             "informed": _first_entries(answer + info),
-            "flagged": _first_entries(answer[1:] + flags),
+            "flagged": np.array([[names.index(name) for name in flags]]),
         }
 
     @property
@@ -294,27 +295,6 @@ class Lanes:
             hooks["load_task_state"](states, lane_in_tile),
             hooks["load_ship"](ships, lane_in_tile),
             self.task.settings,
-        )
-
-    def refuse_lost_targets(self) -> None:
-        """Refuse numbers of other ships that are not finite.
-
-        InputError names the task's file and line, the target and her equations.
-        """
-        rows = self.program.state_rows["task_state"]
-        end = rows.first + len(rows.present)
-        by_lane = lanes_of(self._states)[:, rows.first : end].swapaxes(0, 1)
-        numbers = by_lane.reshape(len(rows.present), -1)[:, : self.num_envs]
-        if np.isfinite(numbers).all():
-            return
-        row, lane = np.argwhere(~np.isfinite(numbers))[0]
-        target = rows.present[row].rpartition(".")[0] or rows.present[row]
-        definition = self.task.definition
-        raise InputError(
-            f"{place_of(definition.step)}: State.{target}: expected a target ship"
-            " within the physical range, got one that has left it in lane"
-            f" {lane} at step {self.steps[lane]:g}; look at how she begins, and at her"
-            f" equations ({', '.join(definition.targets)})"
         )
 
     def get_state(self) -> dict[str, Any]:

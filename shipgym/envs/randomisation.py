@@ -8,8 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from shipgym.checks import check_choice, check_number, check_whole, unexpected
-from shipgym.envs.family import family
+from shipgym.checks import check_choice, check_number, unexpected
 from shipgym.errors import InputError
 from shipgym.models import ShipModel, load_model
 from shipgym.sea.conditions import Weather
@@ -39,10 +38,6 @@ class Randomisation:
     # least and largest displacement, parts of that of the model: accelerations are
     # divided by it
     loading_range: Range | None = None
-    # number of hulls of a family of ships that are not known, in place of the model
-    # (`shipgym.envs.family`), and the seed they are drawn with
-    family: int = 0
-    family_seed: int = 0
 
     def __post_init__(self) -> None:
         if self.model_uncertainty is not None:
@@ -53,8 +48,6 @@ class Randomisation:
             given = getattr(self, name)
             if given is not None:
                 _check_range(given, name)
-        check_whole(self.family, "family", at_least=0)
-        check_whole(self.family_seed, "family_seed", at_least=0)
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
@@ -78,8 +71,6 @@ class Randomisation:
         Raises InputError if a model cannot be drawn from, has another structure, or is
         not loaded by its coefficients.
         """
-        if self.family:
-            return self._family(model, seas)
         models = [model]
         if self.ensemble:
             models += self._others(model)
@@ -87,25 +78,6 @@ class Randomisation:
         if self.model_uncertainty or any(ranges):
             return self._drawn(models, seas)
         return list(product(models, seas))
-
-    def _family(self, model: ShipModel, seas: Sequence[Weather]) -> Pool:
-        """Ships and seas of the family, at the length of a model of their form.
-
-        InputError for a model of another form, and with other variations or a sea.
-        """
-        alone = type(self)(family=self.family, family_seed=self.family_seed)
-        if self != alone or not all(sea.calm for sea in seas):
-            raise InputError(
-                "family: expected no sea and no other randomisation, because the family"
-                " has its own, got both; leave them out, or give family=0"
-            )
-        pool = list(family(self.family, self.family_seed, model.particulars.length))
-        if model.compiled is not pool[0][0].compiled:
-            raise InputError(
-                "family: expected a model in the MMG form without a lag of its gear,"
-                f" such as 'kvlcc2-mmg', got {model.name!r}"
-            )
-        return pool
 
     def _others(self, model: ShipModel) -> list[ShipModel]:
         """Load the ensemble; InputError for a model of another structure."""

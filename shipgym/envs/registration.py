@@ -49,19 +49,20 @@ ENVIRONMENTS: dict[str, dict[str, Any]] = {
         "roll_scale_deg": 5.0,
         "roll_free_deg": 3.0,
         "speed_weight": 1.0,
-        "bounded": 2.0,
+        "bounded": 100.0,
     },
     "shipgym/UnknownShip-v0": {
         "task": "CourseKeeping",
-        "model": "kvlcc2-mmg",
-        "family": 48,
-        "dt": 4.0,
-        "least_change_deg": 5.0,
+        "model": "container-two-zigzags",
+        "model_uncertainty": "covariance",
+        "loading_range": (0.8, 1.1),
+        "speed_range": (0.6, 1.0),
+        "rudder_rate_range": (2.0, 5.0),
+        "sea": ["calm", "slight", "moderate"],
         "course_change_deg": 60.0,
         "change_interval_steps": 100,
         "max_heading_error_deg": 120.0,
-        "cost_lengths": 0.25,
-        "bounded": 10.0,
+        "bounded": 20.0,
     },
     "shipgym/PathFollowing-v0": {
         "task": "PathFollowing",
@@ -120,38 +121,25 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
         Keywords of the environment that differ from their defaults.
     """
     from shipgym.engine.source import kept_source
-    from shipgym.envs.engine import fault_in_python
-    from shipgym.envs.environment import DEFAULT_MODEL, read_options
     from shipgym.envs.ship_env import ShipEnv
-    from shipgym.tasks.task import ENV_OPTIONS
 
     given = {"task": kept_source(task), **options}
-    given |= {
-        name: kept_source(options[name])
-        for name in ("reward", "sensors", "sea")
-        if name in options
-    }
-    own = {
-        name: value
-        for name, value in options.items()
-        if name == "reward" or name not in ENV_OPTIONS
-    }
-    ship, asked, _ = read_options(task, options.get("model", DEFAULT_MODEL), own)
+    for name in given.keys() & {"reward", "sensors", "sea"}:
+        given[name] = kept_source(options[name])
     known = gymnasium.registry.get(check_text(env_id, "env_id"))
     if known is not None and known.kwargs != given:
         raise InputError(
             f"{env_id}: expected an unused id, got one registered for"
             f" {known.kwargs.get('task')!r}; give another name or version"
         )
-    if fault := fault_in_python(ship, asked):
-        raise InputError(fault)
-    ShipEnv(**given).close()
+    env = ShipEnv(**given)
+    env.close()
     try:
         _register(env_id, given)
     except gymnasium.error.Error as error:
         raise InputError(
-            f"env_id: expected an id such as 'harbour/{asked.name}-v0', got {env_id!r}:"
-            f" {error}"
+            f"env_id: expected an id such as 'harbour/{env.task.name}-v0', got"
+            f" {env_id!r}: {error}"
         ) from None
 
 

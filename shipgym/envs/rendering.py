@@ -1,7 +1,7 @@
-"""Pictures of a voyage: chart with path, wake and ship, compass and read-outs."""
+"""Pictures of a voyage: chart with path, wake and ship, and read-outs."""
 
 import os
-from math import cos, degrees, hypot, pi, sin
+from math import cos, degrees, hypot, sin
 from typing import Any
 
 import numpy as np
@@ -80,8 +80,7 @@ class Artist:
         for shape in shapes:
             _draw_shape(chart, shape)
         _draw_ship(chart, state, particulars["length"], particulars.get("beam"))
-        _draw_compass(chart, state)
-        chart.write(readouts(engine, self._lane, state))
+        chart.write(_readouts(engine, self._lane, state))
 
         surface = self._pygame.transform.smoothscale(chart.surface, (SIZE, SIZE))
         if self._mode == "human":
@@ -128,9 +127,8 @@ class _Chart:
     def pixels(self, points: Any) -> Floats:
         """Pixels to the right and down, of the shape of the points."""
         places = (np.asarray(points) - self._centre) / self.metres
-        north, east = np.moveaxis(places, -1, 0)
-        middle = SIDE / 2.0
-        return np.stack([middle + east, middle - north], axis=-1)
+        right_and_up: Floats = places[..., ::-1] * [1.0, -1.0]
+        return SIDE / 2.0 + right_and_up
 
     def line(self, colour: Any, points: Any, width: int = 2 * FINER) -> None:
         """Draw a line through places."""
@@ -144,32 +142,19 @@ class _Chart:
         """Draw a circle of a radius in pixels, or fill it."""
         self._draw.circle(self.surface, colour, self.pixels(centre), radius, width)
 
-    def dial(self, colour: Any, bearing: float, inner: float, outer: float) -> None:
-        """Draw a line from the centre of the compass outwards, within its radius."""
-        direction = COMPASS_RADIUS * np.array([sin(bearing), -cos(bearing)])
-        ends = [COMPASS + inner * direction, COMPASS + outer * direction]
-        self._draw.line(self.surface, colour, *ends, 3 * FINER)
-
-    def dial_face(self) -> None:
-        """Draw the face of the compass."""
-        self._draw.circle(self.surface, PANEL, COMPASS, 1.2 * COMPASS_RADIUS)
-        self._draw.circle(self.surface, FAINT, COMPASS, COMPASS_RADIUS, FINER)
-
     def write(self, lines: dict[str, str]) -> None:
         """Write labels and values in the upper left corner."""
         spacing = 19 * FINER
-        height = 6 * FINER + spacing * len(lines)
-        self.surface.fill(PANEL, (8 * FINER, 8 * FINER, 212 * FINER, height))
+        right = 212 * FINER
+        below = 6 * FINER + spacing * len(lines)
+        self.surface.fill(PANEL, (0, 0, right, below))
         for row, (label, text) in enumerate(lines.items()):
-            down = 14 * FINER + spacing * row
+            down = 6 * FINER + spacing * row
+            name = self._font.render(label, True, FAINT)
             value = self._font.render(text, True, INK)
-            left = 212 * FINER - value.get_width()
-            self.surface.blit(self._font.render(label, True, FAINT), (16 * FINER, down))
+            self.surface.blit(name, (8 * FINER, down))
+            left = right - 8 * FINER - value.get_width()
             self.surface.blit(value, (left, down))
-
-
-COMPASS = np.array([SIDE - 64.0 * FINER, 64.0 * FINER])  # pixels, its centre
-COMPASS_RADIUS = 44.0 * FINER
 
 
 def _direction(angle: float) -> Floats:
@@ -195,14 +180,11 @@ def _draw_path(chart: _Chart, engine: Engine, lane: int) -> None:
     waypoints = engine.waypoints(lane)
     if waypoints is None:
         return
-    radius = engine.path_metres("turn_radius")
-    points: Any = track(waypoints, radius)
-    corridor = engine.path_metres("corridor")
-    if corridor is not None:
-        half = corridor / chart.metres
-        chart.line(CORRIDOR, points, round(2.0 * half))
-        for point in points:
-            chart.circle(CORRIDOR, point, half)
+    points: Any = track(waypoints, engine.path_metres("turn_radius"))
+    half = (engine.path_metres("corridor") or 0.0) / chart.metres
+    chart.line(CORRIDOR, points, round(2.0 * half))
+    for point in points:
+        chart.circle(CORRIDOR, point, half)
     chart.line(PATH, points)
     for point in waypoints:
         chart.circle(PATH, point, 5 * FINER, 2 * FINER)
@@ -240,43 +222,17 @@ def _draw_ship(
     chart.polygon(HULL, _hull(state["x"], state["y"], state["psi"], length, beam))
 
 
-def _draw_compass(chart: _Chart, state: dict[str, float]) -> None:
-    """Draw the heading and, outside, the set-point; north is up."""
-    chart.dial_face()
-    chart.dial(HULL, state["psi"], -0.5, 0.8)
-    if "set_point" in state:
-        chart.dial(ORDER, state["set_point"], 0.85, 1.15)
-
-
-def readouts(engine: Engine, lane: int, state: dict[str, float]) -> dict[str, str]:
+def _readouts(engine: Engine, lane: int, state: dict[str, float]) -> dict[str, str]:
     """Quantities of a lane, with their values and units."""
-    speed = hypot(state["u"], state["v"])
-    heading = state["psi"]
-    lines = {
-        "speed": f"{speed:.1f} m/s, {speed / KNOT:.1f} kn",
-        "heading": _bearing(heading),
-    }
-    if "set_point" in state:
-        set_point = state["set_point"]
-        error = (set_point - heading + pi) % (2.0 * pi) - pi
-        lines["to steer"] = _bearing(set_point)
-        lines["heading error"] = f"{degrees(error):+.1f} deg"
+    lines = {"speed": f"{hypot(state['u'], state['v']) / KNOT:.1f} kn"}
+    angles = {"heading": "psi", "to steer": "set_point"}
+    for label, name in angles.items():
+        if name in state:
+            lines[label] = f"{degrees(state[name]) % 360.0:05.1f} deg"
     lines["rudder"] = f"{degrees(state['delta']):+.1f} deg"
-    shaft = state.get("n", state.get("n_command"))
-    if shaft is not None:
-        lines["shaft"] = f"{60.0 * shaft:.0f} rpm"
     if "cross_track" in engine.task.info_names:
         lines["cross-track"] = f"{engine.info('cross_track')[lane]:+.0f} m"
-    lines["reward"] = f"{engine.outputs.outcomes[0, lane]:+.3f}"
     if state.get("wind_speed"):
         lines["wind"] = f"{state['wind_speed']:.1f} m/s"
-    current = hypot(state.get("current_north", 0.0), state.get("current_east", 0.0))
-    if current:
-        lines["current"] = f"{current:.2f} m/s"
+    lines["reward"] = f"{engine.outputs.outcomes[0, lane]:+.3f}"
     return lines
-
-
-def _bearing(angle: float) -> str:
-    """Text of an angle as on a compass."""
-    tenths = round(degrees(angle) * 10.0) % 3600
-    return f"{tenths / 10.0:05.1f} deg"

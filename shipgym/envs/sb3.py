@@ -5,14 +5,14 @@ It takes none of Gymnasium's vector environments.
 
 import time
 from collections.abc import Sequence
-from typing import Any, Self
+from typing import Any, NoReturn
 
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
-from shipgym.arrays import Flags, Floats
+from shipgym.arrays import Flags
 from shipgym.envs.ship_vector_env import Infos, ShipVectorEnv
 from shipgym.errors import InputError
 from shipgym.extras import library
@@ -27,62 +27,6 @@ VecEnv: Any = library(
 Observations = NDArray[np.float32]
 Indices = None | int | Sequence[int]
 Vectors = VectorEnv[Any, Any, Any]
-
-#: Attributes that all rows share, by the names of the single environment.
-SHARED = (
-    "corridor",
-    "dt",
-    "metadata",
-    "model",
-    "observation_names",
-    "observation_scales",
-    "pace",
-    "render_mode",
-    "spec",
-    "task",
-    "turn_radius",
-)
-SPACES = ("observation_space", "action_space")  # of one ship
-
-
-class Row:
-    """Attributes of the single environment of one row, and those of `set_attr`.
-
-    `env`: a `ShipVectorEnv`; `number`: of its row.
-    """
-
-    def __init__(self, env: Any, number: int) -> None:
-        self._env = env
-        self._number = number
-
-    def __getattr__(self, name: str) -> Any:
-        if name not in (*SHARED, *SPACES):
-            raise AttributeError(f"a row has no attribute {name!r}")
-        return getattr(self._env, f"single_{name}" if name in SPACES else name)
-
-    @property
-    def unwrapped(self) -> Self:
-        """The row itself."""
-        return self
-
-    @property
-    def waypoints(self) -> Floats | None:
-        """North and east of this episode's path, m, shape (n, 2); None without one."""
-        waypoints: Floats | None = self._env.waypoints(self._number)
-        return waypoints
-
-    def physical_state(self) -> dict[str, float]:
-        """State, set-point and weather by name, SI units (`Engine.physical_state`)."""
-        state = self._env.physical_state()
-        return {name: float(values[self._number]) for name, values in state.items()}
-
-    def render(self) -> Any:
-        """Picture, uint8 array of shape (600, 600, 3); None without a render mode."""
-        pictures = self._env.render()
-        return None if pictures is None else pictures[self._number]
-
-
-FIXED = {*SHARED, *SPACES, *(name for name in vars(Row) if not name.startswith("_"))}
 
 
 class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
@@ -123,7 +67,6 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         self.vector_env: Any = _native(env, num_envs, options)
         self._ships: ShipVectorEnv = self.vector_env.unwrapped
         n = self.vector_env.num_envs
-        self._rows = [Row(self._ships, number) for number in range(n)]
         super().__init__(
             n,
             self.vector_env.single_observation_space,
@@ -140,7 +83,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
             self.seed(seed)
 
     def _forget_infos(self) -> None:
-        self._infos: list[dict[str, Any]] = [{} for _ in self._rows]
+        self._infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         self._touched: list[int] = []  # rows whose dictionary is to be emptied
 
     def reset(self) -> Observations:
@@ -229,39 +172,26 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         return self.vector_env.render() or [None] * self.num_envs
 
     def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
-        """Attribute of the single environments of some rows, or one of `set_attr`.
+        """Attribute of the native environment, which all rows share, for some rows."""
+        single = f"single_{attr_name}"  # spaces of one ship
+        name = single if hasattr(self._ships, single) else attr_name
+        return [getattr(self._ships, name) for _ in self._get_indices(indices)]
 
-        See `Row`.
-        """
-        return [getattr(row, attr_name) for row in self._chosen(indices)]
-
-    def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
-        """Store a value for some rows under a user-defined name.
-
-        Raises InputError for an attribute that is fixed when the environments are made.
-        """
-        if attr_name in FIXED:
-            raise InputError(
-                f"set_attr: expected a name of your own, got {attr_name!r}, which is"
-                " fixed when the ships are made; make a new ShipVecEnv with another"
-                " argument"
-            )
-        for row in self._chosen(indices):
-            setattr(row, attr_name, value)
+    def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> NoReturn:
+        """Refuse: what the ships are is fixed when they are made."""
+        raise InputError(
+            f"set_attr: expected no change of {attr_name!r}: the ships are fixed when"
+            " they are made; make a new ShipVecEnv, or use set_options"
+        )
 
     def env_method(
-        self,
-        method_name: str,
-        *method_args: Any,
-        indices: Indices = None,
-        **method_kwargs: Any,
-    ) -> list[Any]:
-        """Call a method of the single environments of some rows (see `Row`)."""
-        results = []
-        for row in self._chosen(indices):
-            method = getattr(row, method_name)
-            results.append(method(*method_args, **method_kwargs))
-        return results
+        self, method_name: str, *args: Any, indices: Indices = None, **kwargs: Any
+    ) -> NoReturn:
+        """Refuse: there is one environment, not one for each row."""
+        raise InputError(
+            f"env_method: expected a method of all ships together, got {method_name!r};"
+            f" call vector_env.unwrapped.{method_name}()"
+        )
 
     def env_is_wrapped(
         self,
@@ -272,10 +202,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
 
         They record the episode statistics of Monitor, and act as no other.
         """
-        return [wrapper_class is Monitor for _ in self._chosen(indices)]
-
-    def _chosen(self, indices: Indices) -> list[Row]:
-        return [self._rows[number] for number in self._get_indices(indices)]
+        return [wrapper_class is Monitor for _ in self._get_indices(indices)]
 
 
 def _info_of(infos: Infos, row: int) -> dict[str, Any]:

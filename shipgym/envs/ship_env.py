@@ -1,6 +1,5 @@
 """One ship under a task as one of Gymnasium's environments."""
 
-from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 from typing import Any, SupportsFloat
@@ -98,15 +97,8 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         self._names = self.task.info_names
         flags = self.task.flags
         self._flags = [name for name in self._names if name in flags]
-        self._note_end()
+        self._over = False
         self._made()
-
-    def _counters(self) -> dict[str, Any]:
-        return {**super()._counters(), "end": np.array(self._end, dtype=np.bool_)}
-
-    def _recall(self, counters: Mapping[str, Any]) -> None:
-        super()._recall(counters)
-        self._note_end(counters["end"].tolist())
 
     def _use(self, engine: Engine) -> None:
         super()._use(engine)
@@ -158,7 +150,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             self._keys = self._drawn_keys()
             episodes[:] = 0
         self._begun = True
-        self._note_end()
+        self._over = False
         self._engine.begin(self._keys, episodes)
         if options and options.get("start"):
             start_lanes(self._engine, options["start"], self._engine.all_lanes)
@@ -171,9 +163,8 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
     ) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
         """Hold a command over one control interval.
 
-        Raises InputError if the action is not a finite number for each command, or no
-        episode has begun. An episode that is over stays as it is and earns 0, with a
-        warning.
+        Raises InputError if the action is not a finite number for each command, no
+        episode has begun, or it is over.
 
         Parameters
         ----------
@@ -192,7 +183,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             the end of an episode also `episode_cost`, which is
             `info["episode"]["cost"]` too, and `is_success`.
         """
-        if not self._begun:
+        if self._over or not self._begun:
             self._refuse_step()
         self._order(action)
         if self._advance() == REFUSED:
@@ -207,22 +198,18 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         info = self._info(numbers)
         if self._artists:
             self._draw_and_show()
-        seen = self._seen()
+        self._over = terminated + truncated > 0.0
+        lost = terminated > 0.0
         if self._over:
-            self._warn_of_the_end()
-            terminated, truncated = self._end
-        elif terminated or truncated:
-            self._note_end((terminated, truncated))
-            info = self._last(info, terminated > 0.0)
-        return seen, reward, terminated > 0.0, truncated > 0.0, info
+            info = self._last(info, lost)
+        seen = self._seen()
+        return seen, reward, lost, truncated > 0.0, info
 
     def _seen(self, begun: Flags | None = None) -> Observation:
         """Return a copy of what the agent sees."""
         seen: Observation = self._observation
         if self._frames is not None:
-            # nothing changes behind the end of an episode
-            shown = self._frames.shown if self._over else self._shown(begun)
-            seen = shown[0]
+            seen = self._shown(begun)[0]
         return seen.copy()
 
     def _last(self, info: dict[str, Any], terminated: bool) -> LastInfo:
@@ -230,22 +217,6 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         cost = float(self._engine.read("episode_cost")[0])
         success = info.get("success", not terminated)
         return LastInfo({**info, "episode_cost": cost, "is_success": success})
-
-    def _note_end(self, end: Any = (0.0, 0.0)) -> None:
-        """Note how an episode ended, terminated or truncated; neither: it goes on."""
-        self._end = tuple(end)
-        self._over = any(end)
-        self._warned = False
-
-    def _warn_of_the_end(self) -> None:
-        """Warn once that an episode is over."""
-        if self._warned:
-            return
-        self._warned = True
-        gymnasium.logger.warn(
-            "step: the episode is over, the ship stays where she is and earns 0; call"
-            " reset when terminated or truncated is true"
-        )
 
     def _draw_and_show(self) -> None:
         self._draw()

@@ -1,6 +1,6 @@
 """Many ships under a task as one of Gymnasium's vector environments."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any, NoReturn
@@ -11,7 +11,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from shipgym.arrays import Flags, Floats
-from shipgym.checks import check_keys, check_whole, quoted, unexpected
+from shipgym.checks import check_keys, quoted, unexpected
 from shipgym.envs.engine import episode_keys
 from shipgym.envs.environment import (
     DEFAULT_MODEL,
@@ -96,32 +96,10 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         self._flags = self._engine.flag_names
         self._masks: dict[str, Flags] = {}  # of steps, where every row has its infos
         self._own_reward = not self.task.definition.shipped
-        self._longest = self._intervals(max_episode_steps)
         self._some_over = False  # NEXT_STEP: whether episodes ended in the last step
         self._keeps_ends = mode is AutoresetMode.DISABLED
         self._over = np.zeros(self.num_envs, dtype=np.bool_)  # then, rows to reset
         self._made()
-
-    def _intervals(self, steps: int | None) -> float:
-        """Control intervals of the longest episode, which may have as many steps."""
-        if steps is None or steps == -1:
-            return np.inf
-        longest = check_whole(steps, "max_episode_steps", at_least=1)
-        return longest * self.pace.action_repeat
-
-    def _counters(self) -> dict[str, Any]:
-        counters = super()._counters()
-        counters["some_over"] = np.array(self._some_over)
-        if self._keeps_ends:
-            counters["over"] = self._over.copy()
-        return counters
-
-    def _recall(self, counters: Mapping[str, Any]) -> None:
-        super()._recall(counters)
-        self._some_over = bool(counters["some_over"])
-        if self._keeps_ends:
-            over = counters["over"]
-            self._over = over.astype(np.bool_)
 
     def reset(
         self,
@@ -282,8 +260,6 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         if self._own_reward and not isfinite(rewards.sum()):
             engine.refuse_rewards()
 
-        if self._longest < self.task.episode_steps:
-            n_ended += self._cut_off()
         observations = self._shown()
         infos = self._infos(engine.all_lanes)
         self._some_over = n_ended > 0 and not self._keeps_ends
@@ -305,17 +281,6 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             outputs.truncated,
             infos,
         )
-
-    def _cut_off(self) -> int:
-        """Truncate episodes of the largest number of steps; return how many went on."""
-        engine = self._engine
-        over = engine.read("ended") > 0.0
-        repeat = self.pace.action_repeat
-        late = repeat * np.ceil(engine.steps / repeat) >= self._longest
-        engine.write("ended", np.where(late, 1.0, over))
-        engine.outputs.truncated |= late
-        engine.outputs.outcomes[2] = engine.outputs.truncated
-        return int((late & ~over).sum())
 
     def _refuse_over(self) -> NoReturn:
         """Raise the InputError of rows that nobody has reset."""

@@ -1,12 +1,11 @@
 """Starts of episodes as they are asked for, `reset(options={"start": {...}})`."""
 
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from shipgym.arrays import Flags
-from shipgym.checks import check_finite, check_keys, check_table
+from shipgym.checks import check_finite, check_keys, check_table, unexpected
 from shipgym.engine.compiling import plain
 from shipgym.engine.episodes import clear_lane
 from shipgym.engine.hooks import (
@@ -18,15 +17,10 @@ from shipgym.engine.hooks import (
     store_commands,
     store_memory,
     store_motion,
+    store_task_state,
     task_step,
 )
-from shipgym.engine.judging import (
-    last_interval,
-    observe_lane,
-    sample,
-    settings_of,
-    store_task,
-)
+from shipgym.engine.judging import last_interval, observe_lane, sample, settings_of
 from shipgym.engine.motion import lost
 from shipgym.engine.records import LANES, field_types
 from shipgym.engine.tiles import outputs_in, tile_of, write_outputs
@@ -59,61 +53,33 @@ def start_lanes(engine: Engine, asked: Any, chosen: Flags) -> None:
         Fields of `Start`.
     chosen : bool array of shape (num_envs,)
     """
+    where = "options: start"
+    state = field_types(engine.task.definition.State)
+    needed = {"heading_error": {"heading_setpoint"}, "cross_track": {"leg"}}
+    known = [name for name in Start._fields if needed.get(name, set()) <= set(state)]
+    check_keys(check_table(asked, where), known, where)
+    limits = {"heading_error": np.pi, "rudder": engine.model.steering.limit}
+    columns = {}
+    for name, values in asked.items():
+        numbers = check_finite(values, f"{where}: {name}")
+        limit = limits.get(name, np.inf)
+        fits = numbers.shape in ((), (engine.num_envs,))
+        if not fits or np.abs(numbers).max() > limit:
+            expected = f"a number or {engine.num_envs}, up to {limit:g} to each side"
+            raise unexpected(f"{where}: {name}", expected, values)
+        columns[name] = np.broadcast_to(numbers, (engine.num_envs,))
+
     start = plain(start_lane, engine.program.hooks)
-    columns = _columns(engine, asked)
-    lanes = np.flatnonzero(chosen)
-    for lane in lanes.tolist():
-        asked_here = {}
-        for name, values in columns.items():
-            asked_here[name] = float(values[lane])
-        one = Start(**asked_here)
+    for lane in np.flatnonzero(chosen).tolist():
+        here = {name: float(values[lane]) for name, values in columns.items()}
         with np.errstate(all="ignore"):
-            fits = start(engine._memory, engine.outputs.memory, lane, one)
+            fits = start(engine._memory, engine.outputs.memory, lane, Start(**here))
         if not fits:
             raise InputError(
                 "options: start: expected a ship that is under control and on her way,"
                 f" got one beyond the physical range, lost or arrived in lane {lane}:"
-                f" {asked_here}"
+                f" {here}"
             )
-
-
-def _columns(engine: Engine, asked: Any) -> Mapping[str, Any]:
-    """Numbers of each lane by name; InputError for those that do not fit."""
-    known = list(Start._fields)
-    state = field_types(engine.task.definition.State)
-    if "heading_setpoint" not in state:
-        known.remove("heading_error")
-    if not {"leg", "cross_track"} <= set(state):
-        known.remove("cross_track")
-    where = "options: start"
-    check_keys(check_table(asked, where), known, where)
-    columns = {}
-    for name, values in asked.items():
-        columns[name] = _column(engine, name, values)
-    return columns
-
-
-def _column(engine: Engine, name: str, values: Any) -> Any:
-    """Numbers of a name, one for each lane."""
-    where = f"options: start: {name}"
-    numbers = check_finite(values, where)
-    shape = (engine.num_envs,)
-    if numbers.shape not in ((), shape):
-        count = engine.num_envs
-        found = numbers.shape
-        raise InputError(f"{where}: expected a number or {count}, got shape {found}")
-    limit = np.inf
-    if name == "heading_error":
-        limit = np.pi
-    elif name == "rudder":
-        limit = engine.model.steering.limit
-    sizes = np.abs(numbers)
-    largest = sizes.max()
-    if largest > limit:
-        raise InputError(
-            f"{where}: expected at most {limit:g} rad to each side, got {largest:g}"
-        )
-    return np.broadcast_to(numbers, shape)
 
 
 def start_lane(memory: Any, output_memory: Any, number: int, start: Start) -> bool:
@@ -122,23 +88,24 @@ def start_lane(memory: Any, output_memory: Any, number: int, start: Start) -> bo
     tile = tile_of(memory, at, 0, number // LANES)
     lane = number % LANES
     clear_lane(tile.result, lane)
-    state = load_task_state(tile.state, lane)
-    motion = started(load_motion(tile.state, lane), state, start)
-    begins = begin_at(tile, lane, motion, state, start.heading_error)
+    motion = started(tile, lane, start)
+    hold_rudder(tile, lane, motion)
+    begins = judge_start(tile, lane, motion, start.heading_error)
     observe_lane(tile, lane)
-    outputs = outputs_in(memory, output_memory, at)
-    write_outputs(tile, outputs, lane, lane + 1)
+    write_outputs(tile, outputs_in(memory, output_memory, at), lane, lane + 1)
     return begins
 
 
-def started(motion: Any, state: Any, start: Start) -> Any:
+def started(tile: Any, lane: int, start: Start) -> Any:
     """Motion with the numbers of a start that are given, but for the heading."""
-    asked = {"u": start.speed, "r": start.yaw_rate, "delta": start.rudder}
-    for name, value in asked.items():
+    motion = load_motion(tile.state, lane)
+    numbers = {"u": start.speed, "r": start.yaw_rate, "delta": start.rudder}
+    for name, value in numbers.items():
         if not np.isnan(value):
             motion = motion._replace(**{name: value})
     if np.isnan(start.cross_track):
         return motion
+    state = load_task_state(tile.state, lane)
     aside = start.cross_track - state.cross_track
     return motion._replace(
         x=motion.x - aside * state.leg.sine,
@@ -146,31 +113,28 @@ def started(motion: Any, state: Any, start: Start) -> Any:
     )
 
 
-def begin_at(
-    tile: Any, lane: int, motion: Any, state: Any, heading_error: float
-) -> bool:
+def hold_rudder(tile: Any, lane: int, motion: Any) -> None:
+    """Order the rudder where it stands."""
+    limit = load_ship(tile.ships, lane).rudder_limit
+    commands = load_commands(tile.state, lane)
+    held = commands._replace(rudder_command=motion.delta / limit)
+    store_commands(tile.state, lane, held)
+
+
+def judge_start(tile: Any, lane: int, motion: Any, heading_error: float) -> bool:
     """Store a motion with what task and memory make of it; whether it is a start."""
     ship = load_ship(tile.ships, lane)
     settings = settings_of(tile)
-    hold_rudder(tile, lane, motion.delta / ship.rudder_limit)
+    state = load_task_state(tile.state, lane)
     interval = last_interval(tile, lane)
-    interval = interval._replace(dt=NO_TIME, rudder_before=motion.delta)
-    given = (interval, ship, settings.task, tile, lane)
-    after, _, failed, arrived = task_step(motion, state, *given)
+    judged = interval._replace(dt=NO_TIME, rudder_before=motion.delta)
+    more = (judged, ship, settings.task, tile, lane)
+    after, _, failed, arrived = task_step(motion, state, *more)
     if not np.isnan(heading_error):
         motion = motion._replace(psi=after.heading_setpoint - heading_error)
-        after, _, failed, arrived = task_step(motion, state, *given)
-
+        after, _, failed, arrived = task_step(motion, state, *more)
     store_motion(tile.state, lane, motion)
-    store_task(tile, lane, after)
-    interval = last_interval(tile, lane)
+    store_task_state(tile.state, lane, after)
     seen = sample(tile, lane, motion, interval, settings)
     store_memory(tile.state, lane, seen)
     return not (failed or arrived or lost(motion, ship))
-
-
-def hold_rudder(tile: Any, lane: int, order: float) -> None:
-    """Order the rudder where it stands, by its limit."""
-    commands = load_commands(tile.state, lane)
-    commands = commands._replace(rudder_command=order)
-    store_commands(tile.state, lane, commands)

@@ -17,6 +17,7 @@ from shipgym.engine.compiled_ship import CompiledSea
 from shipgym.engine.mathematics import sin_cos
 from shipgym.engine.motion import HAS_ROLL, HAS_SEA, Motion, Push
 from shipgym.engine.random import DRAW, S11, TO_UNIT, mix, normal
+from shipgym.engine.record_code import changer
 from shipgym.sea.filters import (
     Filter,
     Oscillator,
@@ -78,6 +79,11 @@ class Sea(NamedTuple):
     roll_velocity: float
     psi_wave: float  # first-order motion, rad, rad/s
     r_wave: float
+
+
+with_current = changer(Sea, "current_north", "current_east")
+#: (sea, gust, drift, the oscillators and the first-order motion)
+moved = changer(Sea, *Sea._fields[Sea._fields.index("gust") :])
 
 
 class FromBow(NamedTuple):
@@ -207,7 +213,8 @@ def encounter(waves: FromBow, u: float, v: float, p: SeaParameters) -> float:
     # Lowest frequency of encounter by that of the waves: in a following sea the filter
     # keeps turning.
     slowest_encounter = 0.1
-    return max(fabs(met), slowest_encounter * p.wave_frequency)
+    lowest = slowest_encounter * p.wave_frequency
+    return max(fabs(met), lowest)
 
 
 def encounter_frequency(motion: Motion, sea: Sea, p: SeaParameters) -> float:
@@ -257,43 +264,22 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
         roll = stepped(roll, normal(word, DRAW[6]), normal(word, DRAW[7]), step)
     first_order = first_order_motion(waves, frequency, heading, p)
 
-    return Sea(
-        mean_north=sea.mean_north,
-        mean_east=sea.mean_east,
-        wind_north=sea.wind_north,
-        wind_east=sea.wind_east,
-        waves_north=sea.waves_north,
-        waves_east=sea.waves_east,
-        current_north=first_order_step(
-            sea.current_north,
-            sea.mean_north,
-            p.current,
-            normal(word, DRAW[0]),
-        ),
-        current_east=first_order_step(
-            sea.current_east,
-            sea.mean_east,
-            p.current,
-            normal(word, DRAW[1]),
-        ),
-        gust=first_order_step(
-            sea.gust,
-            0.0,
-            p.gust,
-            normal(word, DRAW[2]),
-        ),
-        drift=first_order_step(
-            sea.drift,
-            0.0,
-            p.drift,
-            normal(word, DRAW[3]),
-        ),
-        heading_displacement=heading.displacement,
-        heading_velocity=heading.velocity,
-        roll_displacement=roll.displacement,
-        roll_velocity=roll.velocity,
-        psi_wave=first_order.psi,
-        r_wave=first_order.r,
+    north = first_order_step(
+        sea.current_north, sea.mean_north, p.current, normal(word, DRAW[0])
+    )
+    east = first_order_step(
+        sea.current_east, sea.mean_east, p.current, normal(word, DRAW[1])
+    )
+    return moved(
+        with_current(sea, north, east),
+        first_order_step(sea.gust, 0.0, p.gust, normal(word, DRAW[2])),
+        first_order_step(sea.drift, 0.0, p.drift, normal(word, DRAW[3])),
+        heading.displacement,
+        heading.velocity,
+        roll.displacement,
+        roll.velocity,
+        first_order.psi,
+        first_order.r,
     )
 
 
@@ -356,24 +342,7 @@ def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
 
 def add_current(sea: Sea, north: float, east: float) -> Sea:
     """Sea with a current added, m/s."""
-    return Sea(
-        mean_north=sea.mean_north,
-        mean_east=sea.mean_east,
-        wind_north=sea.wind_north,
-        wind_east=sea.wind_east,
-        waves_north=sea.waves_north,
-        waves_east=sea.waves_east,
-        current_north=sea.current_north + north,
-        current_east=sea.current_east + east,
-        gust=sea.gust,
-        drift=sea.drift,
-        heading_displacement=sea.heading_displacement,
-        heading_velocity=sea.heading_velocity,
-        roll_displacement=sea.roll_displacement,
-        roll_velocity=sea.roll_velocity,
-        psi_wave=sea.psi_wave,
-        r_wave=sea.r_wave,
-    )
+    return with_current(sea, sea.current_north + north, sea.current_east + east)
 
 
 _FUNCTIONS = {

@@ -6,6 +6,7 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.constants import GRAVITY
+from shipgym.engine.record_code import zeros
 from shipgym.engine.records import flat
 from shipgym.sea.conditions import Current, Waves, Weather, Wind
 from shipgym.sea.drift import wave_drift
@@ -20,34 +21,7 @@ from shipgym.sea.wind import AIR_DENSITY, gust_filter, wind_curves
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 
 HARMONICS = len(Sines._fields)
-STEADY = Filter(0.0, 0.0, 0.0)
-NO_COSINES = Cosines(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-NO_SINES = Sines(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-CALM = SeaParameters(
-    current_speed=0.0,
-    current_towards=0.0,
-    current=STEADY,
-    wind_speed=0.0,
-    wind_from=0.0,
-    gust=STEADY,
-    waves_from=0.0,
-    wave_frequency=0.0,
-    wave_number=0.0,
-    wave_damping=0.0,
-    wave_ringing=1.0,
-    drift=STEADY,
-    still_air=0.0,
-    wind_surge=NO_COSINES,
-    wind_sway=NO_SINES,
-    wind_yaw=NO_SINES,
-    wind_roll=NO_SINES,
-    drift_surge=NO_COSINES,
-    drift_sway=NO_SINES,
-    drift_yaw=NO_SINES,
-    drift_roll=NO_SINES,
-    heading_variance=NO_COSINES,
-    roll_variance=NO_COSINES,
-)
+CALM: SeaParameters = zeros(SeaParameters)()._replace(wave_ringing=1.0)
 
 
 @lru_cache(maxsize=256)

@@ -6,11 +6,12 @@ rate (weight 0.01), all in units of 30 degrees, the rate per ship length sailed 
 the largest heading error, so that ending early is never an advantage.
 """
 
-from math import copysign, fabs, floor, inf, radians
+from math import fabs, floor, inf, radians
 from typing import Annotated, NamedTuple
 
-from shipgym.engine.mathematics import pick, wrap
+from shipgym.engine.mathematics import wrap
 from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.record_code import changer
 from shipgym.tasks.contract import (
     NO_NUMBERS,
     Interval,
@@ -81,22 +82,6 @@ class Settings(NamedTuple):
     speed_weight: Annotated[
         float, Setting("Cost of a step without way.", at_least=0.0)
     ] = 0.0
-    least_change_deg: Annotated[
-        float,
-        Setting(
-            "Smallest change of the set-point that is drawn, degrees.",
-            at_least=0.0,
-            at_most=90.0,
-        ),
-    ] = 0.0
-    cost_lengths: Annotated[
-        float,
-        Setting(
-            "Ship lengths, sailed at her own speed, that a cost is counted for, so that"
-            " slow and fast ships weigh the same; 0: for each control interval.",
-            at_least=0.0,
-        ),
-    ] = 0.0
     weights: Weights = Weights()
     course_changes_deg: Annotated[
         Numbers,
@@ -119,6 +104,10 @@ class State(NamedTuple):
     integral: float  # of the heading error, rad s
     heading_error: float  # rad
     heel: float  # beyond the limit, in parts of it
+
+
+ordered = changer(State, "heading_setpoint", "next_change", "changes")
+judged = changer(State, "integral", "heading_error", "heel")
 
 
 class Reward(NamedTuple):
@@ -155,14 +144,8 @@ def begin(
         heel=0.0,
     )
     state = changed(before, 0.0, settings, random)
-    return motion, State(
-        heading_setpoint=state.heading_setpoint,
-        next_change=state.next_change,
-        changes=1.0,
-        integral=0.0,
-        heading_error=wrap(state.heading_setpoint - heading),
-        heel=0.0,
-    )
+    error = wrap(state.heading_setpoint - heading)
+    return motion, judged(state, 0.0, error, 0.0)
 
 
 def changed(state: State, steps: float, settings: Settings, random: Random) -> State:
@@ -175,18 +158,13 @@ def changed(state: State, steps: float, settings: Settings, random: Random) -> S
     else:
         largest = radians(settings.course_change_deg)
         change = drawn(random, 1 + 2 * number, -largest, largest)
-        least = min(radians(settings.least_change_deg), largest)
-        if least > 0.0:
-            change += copysign(least * (1.0 - fabs(change) / largest), change)
         part = drawn(random, 2 + 2 * number, 0.5, 1.5)
         wait = floor(settings.change_interval_steps * part)
-    return State(
-        heading_setpoint=state.heading_setpoint + change,
-        next_change=steps + max(wait, 1.0),
-        changes=state.changes + 1.0,
-        integral=state.integral,
-        heading_error=state.heading_error,
-        heel=state.heel,
+    return ordered(
+        state,
+        state.heading_setpoint + change,
+        steps + max(wait, 1.0),
+        state.changes + 1.0,
     )
 
 
@@ -227,47 +205,15 @@ def step(
     integral = integrated(state.integral, error, interval, ship, weights)
     scaled = error * (1.0 / radians(weights.heading_scale_deg))
     way_lost = 1.0 - motion.u * (1.0 / ship.scale_speed)
-    reward = in_own_time(
-        Reward(
-            heading=-scaled * scaled,
-            speed=-settings.speed_weight * max(way_lost, 0.0),
-            steering=steering_reward(motion, interval, ship, weights),
-        ),
-        interval,
-        ship,
-        settings,
+    reward = Reward(
+        heading=-scaled * scaled,
+        speed=-settings.speed_weight * max(way_lost, 0.0),
+        steering=steering_reward(motion, interval, ship, weights),
     )
-    after = State(
-        heading_setpoint=state.heading_setpoint,
-        next_change=state.next_change,
-        changes=state.changes,
-        integral=integral,
-        heading_error=error,
-        heel=heel_excess(motion, weights),
-    )
+    heel = heel_excess(motion, weights)
+    after = judged(state, integral, error, heel)
     lost = fabs(error) > radians(settings.max_heading_error_deg)
     return after, reward, lost, False
-
-
-def in_own_time(
-    reward: Reward, interval: Interval, ship: Ship, settings: Settings
-) -> Reward:
-    """Reward by the lengths that a ship sails in an interval, if that is asked for."""
-    is_asked = settings.cost_lengths > 0.0
-    lengths = interval.dt * ship.speed / ship.length
-    part = pick(is_asked, lengths / max(settings.cost_lengths, 1e-9), 1.0)
-    slower = pick(is_asked, ship.scale_speed / ship.speed, 1.0)
-    steering = reward.steering
-    return Reward(
-        heading=part * reward.heading,
-        speed=part * reward.speed,
-        steering=SteeringReward(
-            rudder=part * steering.rudder,
-            rudder_rate=part * slower * slower * steering.rudder_rate,
-            roll=part * steering.roll,
-            envelope=part * steering.envelope,
-        ),
-    )
 
 
 def worst_cost(settings: Settings) -> float:

@@ -2,7 +2,7 @@
 
 import importlib
 import sys
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
@@ -18,6 +18,7 @@ from shipgym.checks import (
     check_text,
     check_whole,
     did_you_mean,
+    placed,
     quoted,
     unexpected,
 )
@@ -36,7 +37,6 @@ from shipgym.engine.source import (
     annotated,
     check_namespace,
     field_place,
-    keywords,
     read_source,
 )
 from shipgym.engine.specialise import is_shipped
@@ -44,7 +44,6 @@ from shipgym.errors import InputError
 from shipgym.python_files import asked, check_function
 from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.scales import STEPS_PER_LENGTH
-from shipgym.tasks.traffic import targets_of
 
 RECORDS = ("Settings", "State", "Reward", "Observation")
 MOMENT = ("motion", "state", "interval", "ship", "settings")
@@ -176,19 +175,9 @@ class TaskDefinition(Configurable):
     rule: Callable[..., Any] | None = None
 
     @cached_property
-    def targets(self) -> tuple[str, ...]:
-        """Equations of the other ships that a step sails (`shipgym.tasks.traffic`)."""
-        return tuple(targets_of(self.step))
-
-    @cached_property
     def observations(self) -> dict[str, ObservationSpec]:
         """Bounds, unit and scale of each observation, by its path in `Observation`."""
         return _observations(self.Observation)
-
-    @property
-    def stored(self) -> tuple[str, ...]:
-        """Fields of the state that are reported, constraints among them."""
-        return (*self.reported, *self.constraints)
 
     @cached_property
     def flags(self) -> tuple[str, ...]:
@@ -373,37 +362,12 @@ def _check_observation(spec: ObservationSpec | None, where: str) -> None:
 
 
 def _check_names(definition: TaskDefinition) -> None:
-    """Refuse two fields of one name; those of records within count as the record's."""
-    source = definition.source
-    rewards = short_names(definition.Reward)
-    _check_differ(
-        definition.Reward,
-        rewards,
-        definition.reward_source,
-        taken=("end",),
-    )
-    settings = [name for name, *_ in keywords(definition.Settings)]
-    _check_differ(definition.Settings, dict(enumerate(settings)), source)
-    _check_differ(definition.Observation, definition.observation_names, source)
-
-
-def _check_differ(
-    record: Record,
-    names: Mapping[Any, str],
-    where: str,
-    taken: Collection[str] = (),
-) -> None:
-    """Refuse a name that two numbers of a record have, given by their paths."""
-    known: dict[str, Any] = dict.fromkeys(taken)
-    for path, name in names.items():
-        if name in known:
-            field = str(path).partition(".")[0]
-            also = "; the engine has one of that name" if name in taken else ""
-            raise InputError(
-                f"{field_place(record, field, where)}: {record.__name__}: expected"
-                f" names that differ, got two fields {name!r}{also}"
-            )
-        known[name] = path
+    """Refuse two fields of one name, or one of the engine's."""
+    with placed(definition.source):
+        short_names(definition.Observation)
+    with placed(definition.reward_source):
+        if "end" in definition.reward_names:
+            raise InputError("Reward.end: expected another name: the engine has one")
 
 
 def rewarded_step(

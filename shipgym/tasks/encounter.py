@@ -4,23 +4,14 @@ Half of the episodes are one of the 22 cases of Imazu (1987) with jitter, the ot
 random crossings, head-on meetings and overtakings (`shipgym.tasks.other_ships`). A step
 costs the way that is not made good along the track, the distance off it, the rudder,
 and where own ship is inside an ellipse around another (Fujii & Tanaka 1971). Apart from
-the cost, a constraint is the least distance to the others, and `info` counts the rules
-of COLREG that she has broken.
+the cost, a constraint is the least distance to the others.
 """
 
 from typing import Annotated, NamedTuple
 
-from shipgym.engine.mathematics import arctan2, clip, wrap
+from shipgym.engine.mathematics import arctan2, clip, pick, wrap
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.specialise import called
-from shipgym.tasks.collision_rules import (
-    Broken,
-    Watch,
-    no_watch,
-    one_if,
-    together,
-    watched,
-)
 from shipgym.tasks.contract import (
     Flag,
     Interval,
@@ -67,16 +58,7 @@ NAME = "Encounter"
 EPISODE_STEPS = 300
 STEPS_PER_LENGTH = 4.0
 CONSTRAINTS = ("clearance",)
-REPORTED = (
-    "cross_track",
-    "closest",
-    "success",
-    "rule_13",
-    "rule_14",
-    "rule_15",
-    "rule_16",
-    "rule_17",
-)
+REPORTED = ("cross_track", "closest", "success")
 
 COLLISION = 1.0  # ship lengths, between the middles of two ships
 OFF_TRACK = 12.0  # ship lengths, at which the ship is lost
@@ -133,16 +115,10 @@ class State(NamedTuple):
     heading_setpoint: float  # rad, course to the track
     integral: float  # of the heading error, rad s
     others: tuple[Other, Other, Other, Other]
-    watches: tuple[Watch, Watch, Watch, Watch]
     cross_track: float  # m
     closest: float  # m, least distance to another so far
     clearance: float  # how far closer than the least distance, in parts of it
     success: Flag
-    rule_13: float  # how often it was broken so far
-    rule_14: float
-    rule_15: float
-    rule_16: float
-    rule_17: float
 
 
 class Reward(NamedTuple):
@@ -169,19 +145,8 @@ class Met(NamedTuple):
     """Another ship after an interval, and what it was worth."""
 
     other: Other
-    watch: Watch
     distance: float  # m
     inside: float  # 0 to 1, how far own ship is inside the ellipse around her
-    broken: Broken
-
-
-class AllMet(NamedTuple):
-    """The others after an interval."""
-
-    one: Met
-    two: Met
-    three: Met
-    four: Met
 
 
 def begin(
@@ -196,7 +161,6 @@ def begin(
     run = settings.distance * ship.length
     aside = drawn(random, ASIDE_DRAW, -ship.length, ship.length)
     motion = at_service_speed(-run, aside, 0.0, ship)
-    watch = no_watch(motion.psi)
     state = State(
         heading_setpoint=course_to_track(motion, ship),
         integral=0.0,
@@ -206,16 +170,10 @@ def begin(
             met_at(2, case, count, motion, settings, random, ship),
             met_at(3, case, count, motion, settings, random, ship),
         ),
-        watches=(watch, watch, watch, watch),
         cross_track=aside,
         closest=2.0 * run,
         clearance=0.0,
         success=0.0,
-        rule_13=0.0,
-        rule_14=0.0,
-        rule_15=0.0,
-        rule_16=0.0,
-        rule_17=0.0,
     )
     return motion, state
 
@@ -255,7 +213,6 @@ def course_to_track(motion: Motion, ship: Ship) -> float:
 @called
 def met(
     before: Other,
-    watch: Watch,
     motion: Motion,
     interval: Interval,
     ship: Ship,
@@ -264,16 +221,12 @@ def met(
     """Sail another ship for an interval, and judge how she is met."""
     moved = sailed(before, interval.dt)
     near = approach(motion, target(moved))
-    least = settings.least_distance * ship.length
     ahead = settings.ahead * ship.length
     abeam = settings.abeam * ship.length
-    seen, broken = watched(watch, near, motion, least, ship)
     return Met(
         other=decided(moved, near, ship),
-        watch=seen,
         distance=near.distance,
         inside=in_her_way(near, ahead, abeam),
-        broken=broken,
     )
 
 
@@ -285,73 +238,34 @@ def step(
     settings: Settings,
 ) -> tuple[State, Reward, bool, bool]:
     """Sail the others, and judge an interval."""
-    all_met = AllMet(
-        met(state.others[0], state.watches[0], motion, interval, ship, settings),
-        met(state.others[1], state.watches[1], motion, interval, ship, settings),
-        met(state.others[2], state.watches[2], motion, interval, ship, settings),
-        met(state.others[3], state.watches[3], motion, interval, ship, settings),
-    )
-    collided = least_distance(all_met) < COLLISION * ship.length
+    one = met(state.others[0], motion, interval, ship, settings)
+    two = met(state.others[1], motion, interval, ship, settings)
+    three = met(state.others[2], motion, interval, ship, settings)
+    four = met(state.others[3], motion, interval, ship, settings)
+    distance = min(one.distance, two.distance, three.distance, four.distance)
+    inside = one.inside + two.inside + three.inside + four.inside
     off = motion.y / (OFF_TRACK * ship.length)
-    lost = collided | (off * off > 1.0)
+    lost = (distance < COLLISION * ship.length) | (off * off > 1.0)
     arrived = motion.x > settings.distance * ship.length
     reward = Reward(
         delay=-clip(1.0 - own_velocity(motion).north / ship.speed, 0.0, 1.0),
         off_track=-off * off,
-        in_the_way=-settings.ellipse_weight * min(inside_of(all_met), 1.0),
+        in_the_way=-settings.ellipse_weight * min(inside, 1.0),
         steering=steering_reward(motion, interval, ship, settings.weights),
-    )
-    success = arrived & (not lost)
-    after = state_after(motion, state, all_met, success, interval, ship, settings)
-    return after, reward, lost, arrived
-
-
-def state_after(
-    motion: Motion,
-    state: State,
-    all_met: AllMet,
-    success: bool,
-    interval: Interval,
-    ship: Ship,
-    settings: Settings,
-) -> State:
-    """State of the episode after an interval."""
-    one, two, three, four = all_met
-    broken = together(
-        together(one.broken, two.broken),
-        together(three.broken, four.broken),
     )
     course = course_to_track(motion, ship)
     error = wrap(course - motion.psi)
-    distance = least_distance(all_met)
     least = settings.least_distance * ship.length
-    return State(
+    after = State(
         heading_setpoint=course,
         integral=integrated(state.integral, error, interval, ship, settings.weights),
         others=(one.other, two.other, three.other, four.other),
-        watches=(one.watch, two.watch, three.watch, four.watch),
         cross_track=motion.y,
         closest=min(state.closest, distance),
         clearance=max(1.0 - distance / least, 0.0),
-        success=one_if(success),
-        rule_13=state.rule_13 + broken.rule_13,
-        rule_14=state.rule_14 + broken.rule_14,
-        rule_15=state.rule_15 + broken.rule_15,
-        rule_16=state.rule_16 + broken.rule_16,
-        rule_17=state.rule_17 + broken.rule_17,
+        success=pick(arrived & (not lost), 1.0, 0.0),
     )
-
-
-def least_distance(all_met: AllMet) -> float:
-    """Distance to the nearest of the others, m."""
-    one, two, three, four = all_met
-    return min(one.distance, two.distance, three.distance, four.distance)
-
-
-def inside_of(all_met: AllMet) -> float:
-    """How far own ship is inside the ellipses around the others, together."""
-    one, two, three, four = all_met
-    return one.inside + two.inside + three.inside + four.inside
+    return after, reward, lost, arrived
 
 
 def worst_cost(settings: Settings) -> float:

@@ -52,6 +52,16 @@ IMAZU_COURSES = """
 """
 IMAZU = np.array(IMAZU_COURSES.split(), dtype=float).reshape(22, 3)
 
+#: Random meetings: up to this number of the unit interval; least and largest course,
+#: degrees, and speed by that of own ship.
+MEETINGS = np.array(
+    [
+        [0.5, 30.0, 150.0, 0.6, 1.3],  # crossing
+        [0.7, 165.0, 180.0, 0.6, 1.3],  # head-on
+        [0.9, 0.0, 20.0, 0.4, 0.7],  # she is overtaken by own ship
+        [1.0, 0.0, 20.0, 1.3, 1.6],  # she overtakes
+    ]
+)
 SAFE = 3.0  # lengths of own ship, within which others count as close
 LEAST_START = 5.0  # lengths of own ship, between the two at the start
 
@@ -137,14 +147,10 @@ def random_meeting(number: int, run: float, random: Random, ship: Ship) -> Meeti
     first = draws_of(number)
     kind = drawn(random, first + KIND_DRAW, 0.0, 1.0)
     side = 1.0 if drawn(random, first + SIDE_DRAW, -1.0, 1.0) > 0.0 else -1.0
-    if kind < 0.5:  # crossing
-        least, largest, slowest, fastest = 30.0, 150.0, 0.6, 1.3
-    elif kind < 0.7:  # head-on
-        least, largest, slowest, fastest = 165.0, 180.0, 0.6, 1.3
-    elif kind < 0.9:  # she is overtaken by own ship
-        least, largest, slowest, fastest = 0.0, 20.0, 0.4, 0.7
-    else:  # she overtakes
-        least, largest, slowest, fastest = 0.0, 20.0, 1.3, 1.6
+    row = 0
+    while kind >= MEETINGS[row, 0]:
+        row += 1
+    _, least, largest, slowest, fastest = MEETINGS[row]
     degrees = drawn(random, first + COURSE_DRAW, least, largest)
     part = drawn(random, first + SPEED_DRAW, slowest, fastest)
     return Meeting(

@@ -17,6 +17,7 @@ import numpy as np
 from shipgym.checks import check_number
 from shipgym.engine.mathematics import clip, pick, sin_cos, wrap
 from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.record_code import changer
 from shipgym.errors import InputError
 from shipgym.tasks.contract import (
     NO_NUMBERS,
@@ -159,6 +160,16 @@ class State(NamedTuple):
     reversals_per_minute: float  # mean since the start
     corridor: float  # distance beyond its edge, in parts of its half width
     heel: float  # beyond the limit, in parts of it
+
+
+gone_on = changer(
+    State,
+    "leg",
+    "heading_setpoint",
+    "heading_error",
+    "cross_track",
+    "distance_made_good",
+)
 
 
 class Reward(NamedTuple):
@@ -386,22 +397,8 @@ def on_event(
             along_track = fix(motion.x, motion.y, leg, ship, settings).along_track
 
     at = fix(motion.x, motion.y, leg, ship, settings)
-    return State(
-        leg=leg,
-        heading_setpoint=at.course,
-        integral=state.integral,
-        heading_error=wrap(at.course - motion.psi),
-        cross_track=at.cross_track,
-        distance_made_good=along_track,
-        success=state.success,
-        in_corridor=state.in_corridor,
-        grounded=state.grounded,
-        rudder_activity=state.rudder_activity,
-        rudder_travel=state.rudder_travel,
-        reversals_per_minute=state.reversals_per_minute,
-        corridor=state.corridor,
-        heel=state.heel,
-    )
+    error = wrap(at.course - motion.psi)
+    return gone_on(state, leg, at.course, error, at.cross_track, along_track)
 
 
 def step(

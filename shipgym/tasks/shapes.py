@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from shipgym.checks import check_choice, check_finite, check_number, unexpected
+from shipgym.checks import unexpected
 from shipgym.errors import InputError
 from shipgym.python_files import asked, place_of
 
@@ -34,12 +34,6 @@ class Line:
     points: Any
     colour: Colour = "ink"
 
-    def __post_init__(self) -> None:
-        points = check_finite(self.points, "Line: points")
-        if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
-            raise unexpected("Line: points", "two points or more", self.points)
-        check_colour(self.colour, "Line: colour")
-
 
 @dataclass(frozen=True, eq=False)
 class Circle:
@@ -50,11 +44,6 @@ class Circle:
     radius: float  # m
     colour: Colour = "ink"
     filled: bool = False
-
-    def __post_init__(self) -> None:
-        check_finite((self.x, self.y), "Circle: x, y")
-        check_number(self.radius, "Circle: radius", above=0.0)
-        check_colour(self.colour, "Circle: colour")
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,11 +57,6 @@ class ShipOutline:
     beam: float | None = None  # m, by default 0.15 of the length
     colour: Colour = "ink"
 
-    def __post_init__(self) -> None:
-        check_finite((self.x, self.y, self.psi), "ShipOutline: x, y, psi")
-        check_number(self.length, "ShipOutline: length", above=0.0)
-        check_colour(self.colour, "ShipOutline: colour")
-
 
 @dataclass(frozen=True, eq=False)
 class ChartWidth:
@@ -80,21 +64,8 @@ class ChartWidth:
 
     width: float  # m
 
-    def __post_init__(self) -> None:
-        check_number(self.width, "ChartWidth: width", above=0.0)
-
 
 Shape = Line | Circle | ShipOutline | ChartWidth
-
-
-def check_colour(colour: Any, where: str) -> None:
-    """Refuse anything but the name of a colour, or three numbers from 0 to 255."""
-    if isinstance(colour, str):
-        check_choice(colour, _COLOURS, where)
-        return
-    is_rgb = isinstance(colour, tuple) and len(colour) == 3
-    if not is_rgb or not all(number in range(256) for number in colour):
-        raise unexpected(where, "a name or red, green, blue from 0 to 255", colour)
 
 
 def rgb(colour: Colour) -> Rgb:

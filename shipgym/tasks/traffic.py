@@ -5,7 +5,7 @@ course and speed by `advance`, one that sails by equations of her own by a funct
 `vessel` makes of them. All of it becomes part of the compiled loop over ships.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from math import fabs, sqrt
 from typing import Any, NamedTuple
 
@@ -13,14 +13,8 @@ from shipgym.checks import check_whole
 from shipgym.engine.mathematics import arctan2, clip, pick, sin_cos, wrap
 from shipgym.engine.motion import CALM, Motion, Ship, lost, sail
 from shipgym.engine.records import is_record
-from shipgym.engine.specialise import (
-    NOTHING,
-    Specialisation,
-    captured_globals,
-    is_plain,
-)
+from shipgym.engine.specialise import NOTHING, Specialisation
 from shipgym.errors import InputError
-from shipgym.python_files import place_of
 from shipgym.tasks.contract import at_service_speed
 
 #: Kinds of an encounter by the rules of the road (COLREG), seen from the own ship.
@@ -227,9 +221,6 @@ def vessel(source: Any, steps: int = 2) -> Callable[..., Motion]:
         "_TARGET_COEFFICIENTS": as_numbers(hooks["load_coefficients"](numbers)),
     }
     made: Any = _OfTarget(hooks).copy(sail_steps)
-    made.equations = place_of(hooks["accelerations"])
-    if made.equations.startswith("<"):  # code made of a table of terms
-        made.equations = model.name
     made.ship = ship
     made.start = at_service_speed(0.0, 0.0, 0.0, ship)
     return made  # type: ignore[no-any-return]
@@ -244,21 +235,3 @@ def as_numbers(record: Any) -> Any:
         else:
             numbers.append(float(value))
     return type(record)(*numbers)
-
-
-def targets_of(function: Any) -> Iterator[str]:
-    """Places of the equations of targets that a function sails, or those it names."""
-    seen: set[Any] = set()
-    pending = [function]
-    while pending:
-        one = pending.pop()
-        if one in seen:
-            continue
-        seen.add(one)
-        if one is advance:
-            yield "constant course and speed"
-        elif hasattr(one, "equations"):
-            yield one.equations
-        else:
-            named = captured_globals(one, {})
-            pending += [value for _, value in named if is_plain(value)]

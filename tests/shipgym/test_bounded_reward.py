@@ -123,26 +123,16 @@ def test_a_check_says_when_one_event_drowns_the_rest():
         remarks = shipgym.check_task("PathFollowing", bounded=bounded).remarks
         drowned = [remark for remark in remarks if "drowns the rest" in remark]
         assert len(drowned) == (0 if bounded else 1)
-    remarks = shipgym.check_task("CourseKeeping", bounded=1e-4).remarks
-    assert any("next to nothing with bounded=0.0001" in remark for remark in remarks)
 
 
-def test_an_episode_that_is_over_stays_over_and_warns_once():
+def test_an_episode_that_is_over_has_to_be_reset():
     env = gymnasium.make(COURSE, episode_steps=2).unwrapped
     env.reset(seed=0)
     env.step(HARD_OVER)
-    seen, _, *flags, _ = env.step(HARD_OVER)
-    assert flags == [False, True]
-    over = copy.deepcopy(env)
-    with pytest.warns(UserWarning, match="the episode is over") as noted:
-        again = [env.step(HARD_OVER) for _ in range(3)]
-    assert len(noted) == 1
-    for same, reward, *still, _ in again:
-        np.testing.assert_array_equal(same, seen)
-        assert (reward, still) == (0.0, flags)
-
-    with pytest.warns(UserWarning, match="the episode is over"):
-        assert list(over.step(HARD_OVER)[2:4]) == flags
+    assert list(env.step(HARD_OVER)[2:4]) == [False, True]
+    for over in (env, copy.deepcopy(env)):
+        with pytest.raises(shipgym.InputError, match="it is over"):
+            over.step(HARD_OVER)
     env.reset()
     assert list(env.step(HARD_OVER)[2:4]) == [False, False]
 

@@ -1,4 +1,4 @@
-"""Encounters: who meets whom, how the others sail, and which rules are broken."""
+"""Encounters: who meets whom, and how the others sail."""
 
 from math import pi
 
@@ -9,7 +9,7 @@ import pytest
 from shipgym import load_model
 from shipgym.engine.motion import Motion
 from shipgym.ships.manoeuvring_model import ship_of
-from shipgym.tasks import collision_rules, other_ships
+from shipgym.tasks import other_ships
 from shipgym.tasks.other_ships import IMAZU, Habits, Other, Place
 from shipgym.tasks.traffic import Target, approach
 
@@ -18,7 +18,6 @@ pytestmark = pytest.mark.interpreted
 ID = "shipgym/Encounter-v0"
 SHIP = ship_of(load_model("container-two-zigzags"), float("inf"))
 L, U = SHIP.length, SHIP.speed
-LEAST = 2.0 * L
 
 
 def sailing(x, y, psi=0.0, u=U):
@@ -89,48 +88,6 @@ def test_another_ship_turns_as_nomoto_says():
     time = L / U
     expected = 0.6 / time * (1.0 - (1.5 * time / (1.5 * time + 5.0)) ** 8)
     assert other.place.r == pytest.approx(expected)
-
-
-@pytest.mark.parametrize(
-    ("own_way", "other", "broken"),
-    [
-        # keeps on: no action at all, and across the bow of who comes first
-        ("on", Target(10.0 * L, 11.5 * L, -pi / 2, U), {"rule_15", "rule_16"}),
-        # late, but behind her
-        ("starboard late", Target(10.0 * L, 9.0 * L, -pi / 2, U), {"rule_16"}),
-        ("starboard", Target(10.0 * L, 9.0 * L, -pi / 2, U), set()),
-        ("port", Target(20.0 * L, 0.0, pi, U), {"rule_14"}),
-        ("starboard", Target(20.0 * L, 0.0, pi, U), set()),
-        ("on", Target(6.0 * L, 0.0, 0.0, 0.4 * U), {"rule_13", "rule_16"}),
-        ("starboard", Target(10.0 * L, -10.0 * L, pi / 2, U), {"rule_17"}),
-        ("on", Target(10.0 * L, -10.0 * L, pi / 2, U), set()),
-    ],
-)
-def test_rules_13_to_17_are_counted_where_they_are_broken(own_way, other, broken):
-    """Own ship, north from the origin, keeps on or turns by 45 degrees for a while."""
-    watch = collision_rules.no_watch(0.0)
-    counted = dict.fromkeys(collision_rules.Broken._fields, 0.0)
-    x = y = 0.0
-    begin = 6.0 if own_way.endswith("late") else 1.0
-    side = {"port": -1.0, "on": 0.0}.get(own_way, 1.0)
-    time = L / U
-    for step in range(120):
-        turned = begin < 0.25 * step < begin + 7.0
-        psi = side * pi / 4 if turned else 0.0
-        x += 0.25 * L * np.cos(psi)
-        y += 0.25 * L * np.sin(psi)
-        passed = 0.25 * time * (step + 1)
-        at = other._replace(
-            x=other.x + passed * other.speed * np.cos(other.course),
-            y=other.y + passed * other.speed * np.sin(other.course),
-        )
-        own = sailing(x, y, psi)
-        near = approach(own, at)
-        watch, now = collision_rules.watched(watch, near, own, LEAST, SHIP)
-        for name, times in now._asdict().items():
-            counted[name] += times
-    assert {name for name, times in counted.items() if times} == broken
-    assert max(counted.values()) <= 1.0
 
 
 def test_the_ellipse_is_longer_ahead_of_her_than_abeam_and_astern():

@@ -16,6 +16,7 @@ from shipgym import InputError
 from shipgym.envs.registration import ENVIRONMENTS
 from shipgym.models import ShipModel
 from shipgym.sea import Current, Weather, Wind
+from tests.shipgym.vector_checker import check_vector_env
 
 pytestmark = pytest.mark.interpreted
 
@@ -258,7 +259,7 @@ def test_reset_says_what_is_wrong():
 @pytest.mark.parametrize("name", IDS)
 def test_every_id_conforms_as_a_vector(name):
     options = {"episode_steps": 6, "disable_env_checker": True}
-    shipgym.check_vector_env(
+    check_vector_env(
         lambda: gymnasium.make_vec(name, 3, episode_steps=6),
         lambda: gymnasium.make(name, **options),
         20,

@@ -373,7 +373,7 @@ def test_a_reversal_is_a_way_back_of_the_rudder_and_not_its_noise():
         ({"waypoints": "north"}, "waypoints: .*got shape"),
         ({"corridor": 5.0}, "ground: expected a number > 5 .*got 4"),
         ({"leg_lengths": (9.0, 8.0)}, "leg_lengths: the largest: .*got 8"),
-        ({"leg_lengths": (5.0,)}, "leg_lengths: expected the least and the largest"),
+        ({"leg_lengths": (5.0,)}, "leg_lengths: expected 2 numbers in a list"),
         ({"max_turn_deg": 170.0}, "max_turn_deg: .*got 170"),
         ({"n_legs": 0}, "n_legs: .*got 0"),
         ({"lookahead": 0.0}, "lookahead: .*got 0"),

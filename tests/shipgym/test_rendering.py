@@ -33,7 +33,7 @@ def sailed(env, steps=60, rudder=0.1):
 
 def where(picture, colour):
     """Metres north and east of the ship at which a colour is on the chart."""
-    chart = picture[200:400, 200:400]  # without read-outs and compass
+    chart = picture[200:400, 200:400]  # without read-outs
     rows, columns = np.nonzero(np.all(chart == colour, axis=-1))
     return METRES * (300 - (rows + 200)), METRES * (columns + 200 - 300)
 

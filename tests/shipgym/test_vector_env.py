@@ -9,7 +9,7 @@ from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatist
 
 import shipgym
 from shipgym import InputError
-from shipgym.envs.checker import check_vector_env
+from tests.shipgym.vector_checker import check_vector_env
 
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
 SHORT = {"episode_steps": 23}
