@@ -26,6 +26,7 @@ from shipgym.engine.specialise import (
     is_plain,
     named_globals,
 )
+from shipgym.python_files import nested_code
 
 _UNKNOWN: dict[int, Any] = {}
 
@@ -58,18 +59,18 @@ class _Trace:
         """Add a value by its text."""
         self.digest.update(repr(value).encode() + b"\0")
 
-    def visit(self, value: Any) -> None:
-        """Add a value."""
+    def visit(self, value: Any, attributes: tuple[str, ...] = ()) -> None:
+        """Add a value; of a module, those of its members named by `attributes`."""
         if isinstance(value, FunctionType):
             self._visit_function(value)
         elif isinstance(value, ModuleType):
-            self.add(value.__name__)  # those that Numba compiles never change
+            self._visit_module(value, attributes)
         elif isinstance(value, np.ndarray):
             self.add((value.dtype, value.shape, value.strides, value.tobytes()))
         elif isinstance(value, tuple | list):
             fields = getattr(value, "_fields", len(value))
             self.add((type(value).__qualname__, fields))
-            self._visit_all(value)
+            self._visit_all(value, attributes)
         elif is_record(value):
             self.add((value.__name__, value._fields))
             self._visit_all(value._field_defaults.items())
@@ -83,9 +84,20 @@ class _Trace:
             _UNKNOWN[id(value)] = value  # so that no other value has its number
             self.add((process_name(os.getpid()), id(value)))
 
-    def _visit_all(self, values: Iterable[Any]) -> None:
+    def _visit_all(
+        self,
+        values: Iterable[Any],
+        attributes: tuple[str, ...] = (),
+    ) -> None:
         for value in values:
-            self.visit(value)
+            self.visit(value, attributes)
+
+    def _visit_module(self, module: ModuleType, attributes: tuple[str, ...]) -> None:
+        self.add(module.__name__)
+        if not self._is_new((module, attributes)):
+            return
+        for name in attributes:
+            self.visit(vars(module).get(name), attributes)
 
     def _visit_function(self, function: FunctionType) -> None:
         self.add(is_inlined(function))
@@ -104,11 +116,14 @@ class _Trace:
         keyword_defaults = function.__kwdefaults__ or {}
         self._visit_all(keyword_defaults.items())
 
+        attributes: list[str] = []
+        for code in nested_code(function.__code__):
+            attributes += code.co_names
         for name, value in captured_globals(function, self.hooks):
             hook = function.__globals__.get(name)
             self.add(name)
             self.add(is_inlined(hook))  # a hook may say so
-            self.visit(value)
+            self.visit(value, tuple(attributes))
 
     def _visit_code(self, code: CodeType, doc: str | None) -> None:
         self.digest.update(code.co_code)

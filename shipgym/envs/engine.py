@@ -293,10 +293,9 @@ class Engine(Lanes):
         texts, objects or complex numbers.
         """
         array = as_numbers(actions, "actions")
-        if array.shape != self._orders.shape:
-            raise InputError(
-                f"actions: expected shape {self._orders.shape}, got {array.shape}"
-            )
+        shape = self._orders.shape
+        if array.shape != shape:
+            raise InputError(f"actions: expected shape {shape}, got {array.shape}")
         self._orders[...] = array
 
     def step(self, actions: ArrayLike) -> tuple[Observation, Floats, Flags, Flags]:

@@ -98,7 +98,9 @@ def _checked(model: ShipModel, given: Task, randomisation: Randomisation) -> Tas
         *_differ(many, one, STEPS // 4, 0.0, "alone"),
     ]
     sailed = _sailed_at_random(many)
-    remarks = [*_printed(many), *(list(_positive(many, sailed)) or _rare(sailed))]
+    remarks = list(_printed(many))
+    positive = list(_positive(many, sailed))
+    remarks += positive or _rare(sailed)
     return TaskCheck(given.name, tuple(problems), tuple(remarks))
 
 

@@ -206,7 +206,8 @@ def on_arc(past: float, aside: float, leg: Leg, radius: float) -> OnArc:
 
     half_turn = 0.5 * fabs(leg.turn)
     from_centre = sqrt(across * across + reach * reach)
-    inside = radius - from_centre + (reach - to_middle)
+    beyond_reach = reach - to_middle
+    inside = radius - from_centre + beyond_reach
     return OnArc(
         turned=half_turn + arctan2(across, reach),
         cross_track=side * inside,
