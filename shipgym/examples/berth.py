@@ -1,5 +1,4 @@
-"""A berth approach: come to rest alongside, by rudder and shaft. Run it to check the
-task and to train an agent."""
+"""A berth approach: come to rest alongside, by rudder and shaft."""
 
 from math import sqrt
 from typing import Annotated, NamedTuple
@@ -10,20 +9,14 @@ from shipgym.tasks.shapes import ChartWidth, Line, ShipOutline
 
 EPISODE_STEPS = 300
 REPORTED = ("distance", "speed")
+QUAY = 0.6  # ship lengths to starboard
+NEAR = 0.4  # ship lengths to the berth at the end
+SLOW = 0.06  # part of service speed at the end
 
 
 class Settings(NamedTuple):
     distance: Annotated[float, Setting("At the start, ship lengths.", above=1.0)] = 7.0
     speed: Annotated[float, Setting("Then, part of service speed.", above=0.0)] = 0.4
-    quay: Annotated[
-        float, Setting("To the quay, ship lengths to starboard.", above=0.0)
-    ] = 0.6
-    near: Annotated[
-        float, Setting("To the berth at the end, ship lengths.", above=0.0)
-    ] = 0.4
-    slow: Annotated[float, Setting("At the end, part of service speed.", above=0.0)] = (
-        0.06
-    )
 
 
 class State(NamedTuple):
@@ -57,7 +50,7 @@ class Observation(NamedTuple):
 def wanted_speed(distance, ship, settings):
     """Speed from which she still stops: its square falls with the distance."""
     share = clip(distance / (settings.distance * ship.length), 0.0, 1.0)
-    return ship.speed * (0.5 * settings.slow + settings.speed * sqrt(share))
+    return ship.speed * (0.5 * SLOW + settings.speed * sqrt(share))
 
 
 def begin(ship, settings, random, plan):
@@ -80,10 +73,10 @@ def step(motion, state, interval, ship, settings):
         off_line=-off_line * off_line,
         heading=-4.0 * motion.psi * motion.psi,
     )
-    aground = (off_line > settings.quay) | (off_line < -2.0)
+    aground = (off_line > QUAY) | (off_line < -2.0)
     failed = aground | (motion.x > ship.length)
-    stopped = speed < settings.slow * ship.speed
-    arrived = stopped & (distance < settings.near * ship.length)
+    stopped = speed < SLOW * ship.speed
+    arrived = stopped & (distance < NEAR * ship.length)
     return State(0.0, distance, speed), reward, failed, arrived
 
 
@@ -100,19 +93,9 @@ def observe(readings, state, interval, ship, settings):
 
 def draw(motion, state, ship, settings):
     run = settings.distance * ship.length
-    quay = (settings.quay + 0.1) * ship.length
+    quay = (QUAY + 0.1) * ship.length
     berth = ShipOutline(0.0, 0.0, 0.0, ship.length, None, "safe")
     return [ChartWidth(2.5 * run), Line([(-run, quay), (run, quay)], "land"), berth]
 
 
 OPTIONS = {"model": "tanker", "action": "rudder-shaft", "dt": 10.0}
-
-if __name__ == "__main__":
-    from stable_baselines3 import PPO
-
-    import shipgym
-
-    shipgym.register_task("harbour/Berth-v0", __file__, **OPTIONS)
-    print(shipgym.check_task(__file__, **OPTIONS))
-    ships = shipgym.ShipVecEnv("harbour/Berth-v0", num_envs=32)
-    PPO("MlpPolicy", ships, n_steps=256, verbose=1).learn(500_000)

@@ -1,5 +1,5 @@
 """A winding river: its current differs from place to place, and past a village a speed
-limit holds. Run it to check the task and to train an agent."""
+limit holds."""
 
 from math import cos, fabs, pi, sin
 from typing import Annotated, NamedTuple
@@ -10,15 +10,13 @@ from shipgym.tasks.shapes import ChartWidth, Line
 
 EPISODE_STEPS = 600
 REPORTED = ("off", "over")
+WAVE, SWING = 2.0 * pi / 8e3, 600.0  # of its bends, rad/m, and m to each side
+END, VILLAGE = 12000.0, 6000.0  # m north; the village is 2 km long
 
 
 class Settings(NamedTuple):
-    wave: Annotated[float, Setting("Of its bends, rad/m.", above=0.0)] = 2.0 * pi / 8e3
-    swing: Annotated[float, Setting("Of the bends to each side, m.")] = 600.0
     half_width: Annotated[float, Setting("Of the river, m.", above=0.0)] = 350.0
     stream: Annotated[float, Setting("In its middle, m/s, southward.")] = 1.0
-    end: Annotated[float, Setting("Of the voyage, m north.", above=0.0)] = 12000.0
-    village: Annotated[float, Setting("Its middle, 2 km long, m north.")] = 6000.0
     limit: Annotated[float, Setting("Over ground there, m/s.", above=0.0)] = 4.0
 
 
@@ -45,44 +43,44 @@ class Observation(NamedTuple):
     limit: Annotated[float, ObservationSpec(0.0, 3.0, "m/s", 8.0)]  # two lengths ahead
 
 
-def middle(x, settings):
+def middle(x):
     """East of the river's middle, m."""
-    return settings.swing * sin(settings.wave * x)
+    return SWING * sin(WAVE * x)
 
 
-def course(x, settings):
+def course(x):
     """Course of the river, rad."""
-    return arctan2(settings.wave * settings.swing * cos(settings.wave * x), 1.0)
+    return arctan2(WAVE * SWING * cos(WAVE * x), 1.0)
 
 
 def current(x, y, settings):
-    share = clip((y - middle(x, settings)) / settings.half_width, -1.0, 1.0)
+    share = clip((y - middle(x)) / settings.half_width, -1.0, 1.0)
     speed = settings.stream * (share * share - 1.0)
-    sine, cosine = sin_cos(course(x, settings))
+    sine, cosine = sin_cos(course(x))
     return speed * cosine, speed * sine
 
 
 def limit_at(x, ship, settings):
     """Speed limit, m/s; twice her speed where there is none."""
-    return pick(fabs(x - settings.village) < 1000.0, settings.limit, 2.0 * ship.speed)
+    return pick(fabs(x - VILLAGE) < 1000.0, settings.limit, 2.0 * ship.speed)
 
 
 def begin(ship, settings, random, plan):
     aside = 0.4 * settings.half_width * drawn(random, 0, -1.0, 1.0)
-    along = course(0.0, settings)
+    along = course(0.0)
     motion = at_service_speed(0.0, aside, along + drawn(random, 1, -0.1, 0.1), ship)
     return motion, State(along, aside / settings.half_width, 0.0)
 
 
 def step(motion, state, interval, ship, settings):
-    off = (motion.y - middle(motion.x, settings)) / settings.half_width
-    along = course(motion.x, settings)
+    off = (motion.y - middle(motion.x)) / settings.half_width
+    along = course(motion.x)
     speed = motion.u - settings.stream * (1.0 - off * off)  # over ground
     limit = limit_at(motion.x, ship, settings)
     over = max(speed - limit, 0.0)
     delay = clip(1.0 - speed / min(limit, ship.speed - settings.stream), 0.0, 1.0)
     reward = Reward(-delay, -off * off, -over * over)
-    return State(along, off, over), reward, fabs(off) > 1.0, motion.x > settings.end
+    return State(along, off, over), reward, fabs(off) > 1.0, motion.x > END
 
 
 def worst_cost(settings):
@@ -90,9 +88,9 @@ def worst_cost(settings):
 
 
 def observe(readings, state, interval, ship, settings):
-    along = course(readings.x, settings)
+    along = course(readings.x)
     sine, cosine = sin_cos(wrap(along - readings.psi))
-    bend = course(readings.x + ship.length, settings) - along
+    bend = course(readings.x + ship.length) - along
     limit = limit_at(readings.x + 2.0 * ship.length, ship, settings)
     motions = (readings.r, readings.v, readings.u)
     return Observation(sine, cosine, bend, *motions, state.off, limit)
@@ -101,19 +99,9 @@ def observe(readings, state, interval, ship, settings):
 def draw(motion, state, ship, settings):
     norths = [motion.x + 50.0 * k for k in range(-25, 26)]
     half = settings.half_width
-    port = [(north, middle(north, settings) - half) for north in norths]
-    starboard = [(north, middle(north, settings) + half) for north in norths]
+    port = [(north, middle(north) - half) for north in norths]
+    starboard = [(north, middle(north) + half) for north in norths]
     return [ChartWidth(2000.0), Line(port, "land"), Line(starboard, "land")]
 
 
 OPTIONS = {"model": "kvlcc2-mmg", "action": "rudder-shaft", "dt": 10.0}
-
-if __name__ == "__main__":
-    from stable_baselines3 import PPO
-
-    import shipgym
-
-    shipgym.register_task("harbour/River-v0", __file__, **OPTIONS)
-    print(shipgym.check_task(__file__, **OPTIONS))
-    ships = shipgym.ShipVecEnv("harbour/River-v0", num_envs=32)
-    PPO("MlpPolicy", ships, n_steps=256, verbose=1).learn(500_000)

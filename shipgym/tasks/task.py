@@ -317,7 +317,7 @@ class Task:
                 name=self.definition.observation_names[path],
                 low=spec.low,
                 high=spec.high,
-                scale=self.scale(path, ship),
+                scale=self.scale_of(spec, ship),
                 path=path,
             )
             observed.append(quantity)
@@ -328,10 +328,6 @@ class Task:
         if self.sensors is not None:
             return self.sensors
         return shipped_sensors(windy, self.noise > 0.0, self.measurement == "filtered")
-
-    def scale(self, path: str, ship: Ship) -> float:
-        """Physical value of an observation of 1."""
-        return self.scale_of(self.definition.observations[path], ship)
 
     def scale_of(self, spec: ObservationSpec, ship: Ship) -> float:
         """Physical value of an observation of 1, by its specification."""

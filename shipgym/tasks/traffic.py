@@ -92,13 +92,6 @@ def target_of(motion: Motion) -> Target:
     )
 
 
-def distance_to(motion: Motion, target: Target) -> float:
-    """Distance of another ship, m."""
-    away_x = target.x - motion.x
-    away_y = target.y - motion.y
-    return sqrt(away_x * away_x + away_y * away_y)
-
-
 def approach(motion: Motion, target: Target) -> Approach:
     """How a ship in still water, and another, approach each other."""
     away_x = target.x - motion.x
@@ -115,10 +108,11 @@ def approach(motion: Motion, target: Target) -> Approach:
     closest_x = away_x + tcpa * north
     closest_y = away_y + tcpa * east
     squared_dcpa = closest_x * closest_x + closest_y * closest_y
+    squared_distance = away_x * away_x + away_y * away_y
     to_other = arctan2(away_y, away_x)
     to_own = arctan2(-away_y, -away_x)
     return Approach(
-        distance=distance_to(motion, target),
+        distance=sqrt(squared_distance),
         bearing=wrap(to_other - motion.psi),
         aspect=wrap(to_own - target.course),
         dcpa=sqrt(squared_dcpa),
