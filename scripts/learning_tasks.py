@@ -2,7 +2,7 @@
 
     python scripts/learning_tasks.py rudder-roll --seconds 60
     python scripts/learning_tasks.py encounter --search 0    # the rule as it is shipped
-    python scripts/learning_tasks.py unknown-ship --seeds 3 --frames 8 --on-rule
+    python scripts/learning_tasks.py unknown-ship --seeds 3 --frames 8
 
 The numbers of a rule are searched by CMA-ES, and agents (stable-baselines3's PPO)
 learn, for as many seconds of processor each, on episodes of their own. With `--on-rule`
@@ -127,7 +127,7 @@ def main() -> None:
     given = parser.parse_args()
     torch.set_num_threads(1)
     task = TASKS[given.task]
-    ships = ShipVecEnv(task.env, EPISODES, seed=JUDGED)
+    ships = ships_of(task, EPISODES, JUDGED)
     rule = rule_of(task, ships)
     print("| | cost | beyond | success |\n| --- | ---: | ---: | ---: |")
     best = show("rule, set by hand", judged(rule, ships))
@@ -137,13 +137,17 @@ def main() -> None:
         ships.seed(JUDGED)
         best = show(f"rule, {seconds:.0f} s", judged(rule, ships))
     for seed in range(given.seeds):
-        options = {"frame_stack": given.frames}
-        if given.on_rule:
-            options |= {"base": rule, "authority": 0.5}
-        agent = learned(task, seed, given.seconds, options)
-        ships.seed(JUDGED)
-        run = judged(agent, ResidualVecEnv(ships, **options))
+        base = rule if given.on_rule else None
+        ships = ships_of(task, 64, 1000 * seed, given.frames, base)
+        agent = learned(ships, seed, given.seconds)
+        run = judged(agent, ships_of(task, EPISODES, JUDGED, given.frames, base))
         show(f"PPO, seed {seed}, {agent.num_timesteps} steps", run, best)
+
+
+def ships_of(task: Task, n: int, seed: int, frames: int = 1, base: Any = None) -> Any:
+    """Ships of a task, with a rule whose rudder an agent changes, or none."""
+    ships = ShipVecEnv(task.env, n, seed=seed, frame_stack=frames)
+    return ships if base is None else ResidualVecEnv(ships, base, authority=0.5)
 
 
 def rule_of(task: Task, ships: Any, numbers: Mapping[str, float] | None = None) -> Any:
@@ -184,7 +188,7 @@ def interval(numbers: Floats) -> str:
 
 def searched(task: Task, seconds: float) -> Any:
     """The rule with numbers that a search finds on 48 episodes."""
-    ships = ShipVecEnv(task.env, 48)
+    ships = ships_of(task, 48, SEARCHED)
 
     def costs(candidates: Any) -> Floats:
         found = []
@@ -198,9 +202,8 @@ def searched(task: Task, seconds: float) -> Any:
     return rule_of(task, ships, found.mean)
 
 
-def learned(task: Task, seed: int, seconds: float, options: dict[str, Any]) -> PPO:
+def learned(ships: Any, seed: int, seconds: float) -> PPO:
     """An agent after so many seconds of processor."""
-    ships = ResidualVecEnv(ShipVecEnv(task.env, 64, seed=1000 * seed), **options)
     scaled = VecNormalize(ships, norm_obs=False, gamma=0.99)
     began = time.process_time()
 
