@@ -7,18 +7,12 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from typer import Argument, Option
+from typer import Argument, Exit, Option
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from shipgym.trials.guesses import (
-        ColumnGuess,
-        ConventionGuess,
-        Decision,
-        RudderSide,
-        TrialGuess,
-    )
+    from shipgym.trials.guesses import ColumnGuess, RudderSide, TrialGuess
 
 _STEERING = frozenset({"delta", "delta_command"})
 _TURNING = frozenset({"psi", "r"})
@@ -26,12 +20,12 @@ _TURNING = frozenset({"psi", "r"})
 
 def new_ship_command(
     logs: Annotated[
-        list[Path],
+        list[Path] | None,
         Argument(
             metavar="LOG...",
             help="Logs: CSV, NMEA 0183 or 2000, Signal K, Excel, Parquet or MATLAB.",
         ),
-    ],
+    ] = None,
     out: Annotated[Path, Option(metavar="FILE", help="The ship file to write.")] = Path(
         "ship.toml"
     ),
@@ -41,6 +35,13 @@ def new_ship_command(
             min=0.01,
             max=2e3,
             help="Length between perpendiculars, m; or fill it in later.",
+        ),
+    ] = None,
+    update: Annotated[
+        Path | None,
+        Option(
+            metavar="SHIP.TOML",
+            help="Check this ship file again after a correction; list all faults.",
         ),
     ] = None,
 ) -> None:
@@ -53,23 +54,33 @@ def new_ship_command(
     from shipgym.files import write_text
     from shipgym.pages import render
 
+    if update is not None:
+        _check_again(update)
+        return
+    if not logs:
+        raise InputError("new-ship: expected a log, got none; name its file")
     if out.exists():
         raise InputError(
-            f"{out}: exists already; choose another name with --out, or remove it"
+            f"{out}: exists already; choose another name with --out, remove it, or"
+            f" check it again: shipgym new-ship --update {out}"
         )
     guessed = _guess_trials(logs)
     facts = _facts(guessed, out) | {"length": length}
     ship_file = render("shipgym.pages/ship.toml.jinja", **facts)
     write_text(ship_file, out)
 
-    first, *_ = guessed
     side = facts["side"]
-    notes = _notes(guessed)
+    read = [one.trial for one in guessed if one.trial is not None]
+    notes = list(dict.fromkeys(note for trial in read for note in trial.notes))
+    columns = {
+        one.channel: {"column": one.column, "unit": one.unit}
+        for one in guessed[0].columns
+    }
     answer(
         {
             "written": str(out),
-            "columns": _columns(first),
-            "unused": first.unused,
+            "columns": columns,
+            "unused": guessed[0].unused,
             "rudder_positive": side.side if side else None,
             **{one.name: one.value for one in facts["conventions"]},
             "to_decide": facts["to_decide"],
@@ -82,28 +93,52 @@ def new_ship_command(
         warn(note)
 
 
+def _check_again(path: Path) -> None:
+    """Read all trials of a ship file; exit code 1 where one cannot be read."""
+    from agents.cli.terminal import answer, say
+    from shipgym.trials.ship_file import ShipFile
+
+    faults = ShipFile.load(path).faults()
+    answer({"checked": str(path), "faults": faults})
+    for fault in faults:
+        say(f"to correct: {fault}")
+    if faults:
+        raise Exit(1)
+    say(f"{path}: all trials are read; next: shipgym look {path}")
+
+
 def _facts(guessed: list[TrialGuess], out: Path) -> dict[str, Any]:
     """What the templates of ship file and summary say of the logs."""
-    first, *_ = guessed
+    first, *others = guessed
     side = _rudder_side(guessed)
     speed = _service_speed(guessed)
     named = {column.channel for one in guessed for column in one.columns}
-    has_rate_alone = "r" in named and "psi" not in named
-    are_read = any(one.trial is not None for one in guessed)
-    needs_speed = are_read and has_rate_alone and speed is None
-    shared = _shared_columns(guessed)
+    needs_speed = "r" in named and "psi" not in named and speed is None
+    needs_speed &= any(one.trial is not None for one in guessed)
+    shared = [
+        one for one in first.columns if all(_declares(other, one) for other in others)
+    ]
+    decisions = {
+        one.key: one
+        for guess in guessed
+        for one in guess.decisions
+        if one.section == "columns"
+    }
     return {
         "out": out,
         "guessed": guessed,
         "shared": shared,
-        "decisions": _decisions(guessed),
+        "decisions": list(decisions.values()),
         "to_decide": _to_decide(guessed, side, needs_speed=needs_speed),
         "side": side,
         "no_rudder": not any(_has(one, _STEERING) for one in guessed),
         "can_identify": any(
             _has(one, _STEERING) and _has(one, _TURNING) for one in guessed
         ),
-        "conventions": _conventions(guessed),
+        # one log with another convention is enough: others may not tell
+        "conventions": list(
+            {one.name: one for guess in guessed for one in guess.conventions}.values()
+        ),
         "trial": first.trial,
         "trial_columns": first.columns,
         "unused": first.unused_names,
@@ -113,26 +148,11 @@ def _facts(guessed: list[TrialGuess], out: Path) -> dict[str, Any]:
     }
 
 
-def _notes(guessed: list[TrialGuess]) -> list[str]:
-    """Notes of all trials that could be read, each once."""
-    notes: list[str] = []
-    for one in guessed:
-        if one.trial is not None:
-            notes += [note for note in one.trial.notes if note not in notes]
-    return notes
-
-
-def _conventions(guessed: list[TrialGuess]) -> list[ConventionGuess]:
-    """Conventions of logs that are not the usual ones, each name once.
-
-    One log with another convention is enough: the usual one is also guessed from a log
-    that does not tell.
-    """
-    conventions = {}
-    for one in guessed:
-        for convention in one.conventions:
-            conventions[convention.name] = convention
-    return [*conventions.values()]
+def _declares(guess: TrialGuess, column: ColumnGuess) -> bool:
+    return any(
+        (one.channel, one.declaration) == (column.channel, column.declaration)
+        for one in guess.columns
+    )
 
 
 def _rudder_side(guessed: list[TrialGuess]) -> RudderSide | None:
@@ -144,12 +164,9 @@ def _rudder_side(guessed: list[TrialGuess]) -> RudderSide | None:
 
     sides = [one.side for one in guessed if one.side is not None]
     known = [side for side in sides if side.side is not None]
-    named = {side.side for side in known}
-    if len(named) > 1:
+    if len({side.side for side in known}) > 1:
         return RudderSide(None, "the logs contradict each other")
-    if known:
-        return known[0]
-    return sides[0] if sides else None
+    return next(iter([*known, *sides]), None)
 
 
 def _has(guess: TrialGuess, channels: frozenset[str]) -> bool:
@@ -158,33 +175,6 @@ def _has(guess: TrialGuess, channels: frozenset[str]) -> bool:
     asked = {one.key for one in guess.decisions}
     in_trial = guess.trial.channels.keys() if guess.trial is not None else set()
     return bool(channels & {*named, *asked, *in_trial})
-
-
-def _shared_columns(guessed: list[TrialGuess]) -> list[ColumnGuess]:
-    """Columns that are the same in all logs."""
-    first, *others = guessed
-    declared = [_declarations(other) for other in others]
-    return [
-        one
-        for one in first.columns
-        if all((one.channel, one.declaration) in each for each in declared)
-    ]
-
-
-def _declarations(guess: TrialGuess) -> set[tuple[str, str]]:
-    return {(one.channel, one.declaration) for one in guess.columns}
-
-
-def _decisions(guessed: list[TrialGuess]) -> dict[str, list[Decision]]:
-    """What is left to decide in the tables that all logs share, each key once."""
-    decisions: dict[str, list[Decision]] = {"columns": [], "sensors": []}
-    keys = set()
-    for one in guessed:
-        for decision in one.decisions:
-            if decision.section in decisions and decision.key not in keys:
-                decisions[decision.section].append(decision)
-                keys.add(decision.key)
-    return decisions
 
 
 def _to_decide(
@@ -206,43 +196,41 @@ def _entry(
 ) -> dict[str, Any]:
     """A log for the template of the ship file."""
     of_trial = [one.choices for one in guess.decisions if one.section == "trials"]
-    known = {(one.channel, one.declaration) for one in shared}
-    own = [one for one in guess.columns if (one.channel, one.declaration) not in known]
+    cut, manoeuvres = _cut(guess)
     return {
         "file": _toml_paths(guess.paths, folder),
-        "columns": own,
-        "manoeuvres": _manoeuvres(guess),
+        "columns": [one for one in guess.columns if one not in shared],
+        "cut": cut,
+        "manoeuvres": manoeuvres,
         "decision": next(iter(of_trial), None),
     }
 
 
-def _manoeuvres(guess: TrialGuess) -> int:
-    """Number of manoeuvres in a log that is idle for a third of its time or more."""
+def _cut(guess: TrialGuess) -> tuple[str, int]:
+    """Cut into runs between gaps, or by the rudder in a log that is idle for long.
+
+    With the number of trials; an empty text for none.
+    """
     import numpy as np
 
-    from shipgym.trials.cuts import active_stretches
+    from shipgym.trials.cuts import active_stretches, runs
 
     trial = guess.trial
     if trial is None or "delta" not in trial:
-        return 0
-    is_idle = abs(float(np.median(trial["delta"]))) < 0.05  # rad
-    if not is_idle:
-        return 0
+        return "", 0
+    between_gaps = runs(trial.t)
+    if len(between_gaps) > 1:
+        return json.dumps(between_gaps), len(between_gaps)
     stretches = active_stretches(trial.t, trial["delta"])
-    active = sum(float(last) - float(first) for first, last in stretches)
-    return len(stretches) if active < trial.duration / 1.5 else 0
-
-
-def _columns(guessed: TrialGuess) -> dict[str, Any]:
-    """Column and unit of each channel."""
-    columns = {}
-    for guess in guessed.columns:
-        columns[guess.channel] = {"column": guess.column, "unit": guess.unit}
-    return columns
+    active = sum(last - first for first, last in stretches)
+    is_idle = abs(float(np.median(trial["delta"]))) < 0.05  # rad
+    if is_idle and active < trial.duration / 1.5 and stretches:
+        return '"rudder"', len(stretches)
+    return "", 0
 
 
 def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
-    """Logs read with guessed columns; the first has to be readable.
+    """Logs read with guessed columns; the first has to be a log.
 
     Files of which none steers and turns, but which do together, are one log.
     """
@@ -285,10 +273,8 @@ def _service_speed(guessed: list[TrialGuess]) -> float | None:
     """Speed, m/s, that is exceeded for a tenth of the time in the fastest trial."""
     import numpy as np
 
-    speeds = []
-    for one in guessed:
-        if one.trial is not None and "u" in one.trial:
-            speeds.append(float(np.quantile(one.trial["u"], 0.9)))
+    trials = [one.trial for one in guessed if one.trial is not None]
+    speeds = [float(np.quantile(one["u"], 0.9)) for one in trials if "u" in one]
     return max(speeds, default=None)
 
 
@@ -321,7 +307,6 @@ def look_command(
     from shipgym.trials.ship_file import ShipFile
 
     check_page(out, plots=True)
-    readings: list[dict[str, str]] = []
     if log.suffix == ".toml":
         ship_file = ShipFile.load(log)
         trials = ship_file.trials(decided=False)
@@ -330,21 +315,20 @@ def look_command(
     else:
         guess = guess_trial(log)
         if guess.trial is None:
+            wrong = "; ".join(
+                f"{one.key}: expected {one.choices}" for one in guess.decisions
+            )
             raise InputError(
-                f"{log}: "
-                + "; ".join(
-                    f"{one.key}: expected {one.choices}" for one in guess.decisions
-                )
-                + f"; shipgym new-ship {log} writes a ship file in which to say so"
+                f"{log}: {wrong}; shipgym new-ship {log} writes a ship file in which to"
+                " say so"
             )
         trials = [guess.trial]
         readings = [guess.reading]
         remarks = [one.choices for one in guess.decisions]
 
     write_text(look_page(log.name, trials, readings, remarks), out)
-    fields = []
-    for trial, reading in zip(trials, readings, strict=True):
-        about = {
+    fields = [
+        {
             "name": trial.name,
             "samples": len(trial),
             "duration_s": trial.duration,
@@ -352,13 +336,13 @@ def look_command(
             "read_as": reading,
             "notes": [*trial.notes],
         }
-        fields.append(about)
+        for trial, reading in zip(trials, readings, strict=True)
+    ]
     answer({"written": str(out), "trials": fields, "to_decide": remarks})
     for trial, reading in zip(trials, readings, strict=True):
-        channels = ", ".join(trial.channels)
         say(
             f"{trial.name}: {len(trial)} samples over {trial.duration:.5g} s:"
-            f" {channels}"
+            f" {', '.join(trial.channels)}"
         )
         for channel, words in reading.items():
             say(f"  {channel}: {words}")

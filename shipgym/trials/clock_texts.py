@@ -1,6 +1,7 @@
 """Times as instruments write them, with or without a date, and time zones."""
 
 import re
+import warnings
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -14,9 +15,9 @@ DAY = 86400.0  # s
 _TIME_OF_DAY = re.compile(r"\d\d?:\d\d(:\d\d([.,]\d+)?)?")
 
 
-#: Sizes from which on numbers count from 1970, in which unit: s of the year 1973, and
-#: the same moment in the others.
-_SINCE_1970 = {1e17: "unix ns", 1e14: "unix us", 1e11: "unix ms", 1e8: "unix"}
+#: Sizes from which on numbers count from 1970, in which unit: s of the year 1990, more
+#: than a week has in ms, and the same moment in the others.
+_SINCE_1970 = {6.3e17: "unix ns", 6.3e14: "unix us", 6.3e11: "unix ms", 6.3e8: "unix"}
 
 
 def unit_since_1970(number: float) -> str | None:
@@ -48,69 +49,50 @@ def read_clock(texts: Sequence[str]) -> Floats:
     may be exchanged, that order is taken with which the texts span the shorter time.
     Raises ValueError, with the text, where one is no time.
     """
-    first = next((text for text in texts if text), "")
+    import pandas as pd
+
+    series = pd.Series(texts, dtype=str).str.strip().str.replace(",", ".")
+    series = series.where(series != "", None)
+    first = next(filter(None, texts), "")
     of_day = _TIME_OF_DAY.fullmatch(first) is not None
-    series = _series(texts)
-    seconds = _times_of_day(series) if of_day else _dated_times(series, first)
+    if of_day:
+        has_seconds = series.str.count(":") == 2
+        times = series.where(has_seconds, series + ":00")
+        candidates = [pd.to_timedelta(times, errors="coerce")]
+    else:
+        orders = (False,) if first[:4].isdigit() else (True, False)
+        zero = pd.Timestamp(0, tz="UTC")
+        candidates = [_moments(series, first, order) - zero for order in orders]
+    # no dates at all are worse than those that span a long time
+    likelier = min(
+        candidates, key=lambda one: (one.isna().sum(), one.max() - one.min())
+    )
+    seconds = np.array(likelier.dt.total_seconds(), dtype=np.float64)
     is_known = np.isfinite(seconds)
-    has_text = series.notna().to_numpy()
-    is_wrong = has_text & ~is_known
+    is_wrong = series.notna().to_numpy() & ~is_known
     if is_wrong.any():
-        row = int(is_wrong.argmax())
-        raise ValueError(texts[row])
+        raise ValueError(texts[int(is_wrong.argmax())])
     if of_day:
         seconds[is_known] = np.unwrap(seconds[is_known], period=DAY)
     return seconds
 
 
-def _series(texts: Sequence[str]) -> Any:
-    """Texts as a pandas series with decimal points, missing where empty."""
+def _moments(series: Any, first: str, day_first: bool) -> Any:
+    """Moments of texts, by the form of the first one where they have it."""
     import pandas as pd
 
-    series = pd.Series(texts, dtype=str).str.strip()
-    return series.str.replace(",", ".").replace("", None)
-
-
-def _times_of_day(series: Any) -> Floats:
-    """Seconds since midnight, nan for an invalid time."""
-    import pandas as pd
-
-    colons = series.str.count(":")
-    with_seconds = series.where(colons == 2, series + ":00")
-    times = pd.to_timedelta(with_seconds, errors="coerce")
-    seconds = times.dt.total_seconds()
-    return np.array(seconds, dtype=np.float64)
-
-
-def _dated_times(series: Any, first: str) -> Floats:
-    """Seconds since 1970, nan for an invalid date.
-
-    Of the two orders of day and month the likelier is taken.
-    """
-    import pandas as pd
-
-    begins_with_year = first[:4].isdigit()
-    orders = (False,) if begins_with_year else (True, False)
-    candidates = []
-    for day_first in orders:
-        moments = pd.to_datetime(
-            series,
-            utc=True,
-            format="mixed",
-            dayfirst=day_first,
-            errors="coerce",
-        )
-        since_1970 = moments - pd.Timestamp(0, tz="UTC")
-        candidates.append(since_1970.dt.total_seconds())
-    likelier = min(candidates, key=_implausibility)
-    return np.array(likelier, dtype=np.float64)
-
-
-def _implausibility(seconds: Any) -> tuple[int, float]:
-    """Number of texts that are no dates, then the time that the others span, s."""
-    missing = seconds.isna()
-    span = seconds.max() - seconds.min()
-    return int(missing.sum()), float(span)
+    form = "ISO8601"
+    if not first[:4].isdigit():
+        guess = pd.tseries.api.guess_datetime_format
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of the other order
+            form = guess(first, dayfirst=day_first) or "mixed"
+    moments = pd.to_datetime(series, utc=True, format=form, errors="coerce")
+    rest = moments.isna() & series.notna()
+    if rest.any():
+        settings = {"utc": True, "dayfirst": day_first, "errors": "coerce"}
+        moments[rest] = pd.to_datetime(series[rest], format="mixed", **settings)
+    return moments
 
 
 def is_dated(seconds: float) -> bool:

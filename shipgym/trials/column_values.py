@@ -25,46 +25,22 @@ _COMMON = (-32768.0, 32767.0, 65535.0, 2147483647.0, -2147483648.0, 4294967295.0
 
 
 def column_numbers(table: LogTable, column: Column) -> Floats:
-    """Numbers of a column; of two rudders the mean, of a command degrees of rudder.
+    """Numbers of a column, of a steering command degrees of rudder.
 
     Of a quaternion the heading, rad.
     """
-    numbers = table.numbers(column.name, sided=True)
+    numbers = table.numbers(column.name)
     if column.quaternion is not None:
+        w = numbers
         x, y, z = (table.numbers(name) for name in column.quaternion)
-        return _yaw(numbers, x, y, z)
-    if column.mean_with is not None:
-        others = table.numbers(column.mean_with, sided=True)
-        numbers = 0.5 * (numbers + others)
+        # the first of the angles of Tait and Bryan, about z
+        yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return np.asarray(yaw)
     if column.full is None:
         return numbers
     if column.minus is not None:
-        others = table.numbers(column.minus)
-        numbers = numbers - others
-
-    from_neutral = numbers - column.neutral
-    deflection = from_neutral / column.full
-    return deflection * FULL_RUDDER_DEG
-
-
-def _yaw(w: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
-    """Yaw of a quaternion, about z and first of the angles of Tait and Bryan, rad."""
-    sine = 2.0 * (w * z + x * y)
-    cosine = 1.0 - 2.0 * (y * y + z * z)
-    yaw: Floats = np.arctan2(sine, cosine)
-    return yaw
-
-
-def two_rudders_note(table: LogTable, column: Column) -> str:
-    """Mean difference of two rudders, and what it says of the bias of each."""
-    first = table.numbers(column.name, sided=True)
-    second = table.numbers(str(column.mean_with), sided=True)
-    half = 0.5 * float(np.nanmean(first - second))
-    return (
-        f"the rudder is the mean of '{column.name}' and '{column.mean_with}'; if both"
-        f" are laid alike, the bias of the first is that of the mean {half:+.2g}"
-        f" {column.unit}, that of the second {-half:+.2g} {column.unit}"
-    )
+        numbers = numbers - table.numbers(column.minus)
+    return (numbers - column.neutral) / column.full * FULL_RUDDER_DEG
 
 
 def without_sentinels(
@@ -78,38 +54,22 @@ def without_sentinels(
     largest = LARGEST_MAGNITUDES[channel] / factor
     if channel in ("psi", "cog", "wind_from"):
         largest = min(largest, 2.0 * np.pi / factor + 1.0)
+    known = (*_COMMON, *_SENTINELS.get(channel, ()))
+    written = np.unique(numbers[np.abs(numbers) > 99.0]).tolist()
+    outermost = {*written[:3], *written[-3:]}
     values = numbers
     words = []
-    for size in _suspects(channel, numbers):
-        is_size = np.abs(numbers) == size
-        others = np.abs(values[np.isfinite(values) & ~is_size])
-        is_far = others.size and size > 3.0 * others.max()
-        if is_far or size > largest:
-            values = np.where(is_size, np.nan, values)
-            count = np.count_nonzero(is_size)
-            written, *_ = numbers[is_size]
-            words.append(f'{count} values of {written:g} stand for "no value"')
+    for number in sorted(outermost, key=abs, reverse=True):
+        digits = f"{abs(number):.10g}".replace(".", "")
+        are_nines = abs(number) >= 999.0 and set(digits) == {"9"}
+        others = np.abs(values[np.isfinite(values) & (values != number)])
+        is_far = others.size and abs(number) > 3.0 * others.max()
+        if (number in known or are_nines) and (is_far or abs(number) > largest):
+            is_number = numbers == number
+            values = np.where(is_number, np.nan, values)
+            count = np.count_nonzero(is_number)
+            words.append(f'{count} values of {number:g} stand for "no value"')
     return values, words
-
-
-def _suspects(channel: str, numbers: Floats) -> list[float]:
-    """Magnitudes in a column that may stand for "no value", the largest first."""
-    is_large = np.abs(numbers) > 99.0
-    written = np.unique(numbers[is_large])
-    outermost = [*written[:3], *written[-3:]]
-    known = (*_COMMON, *_SENTINELS.get(channel, ()))
-    sizes = set()
-    for number in outermost:
-        size = float(abs(number))
-        if number in known or _is_nines(size):
-            sizes.add(size)
-    return sorted(sizes, reverse=True)
-
-
-def _is_nines(size: float) -> bool:
-    """Return whether a number is written by nines alone, three of them or more."""
-    digits = f"{size:.10g}".replace(".", "")
-    return size >= 999.0 and set(digits) == {"9"}
 
 
 def read_positions(
@@ -121,15 +81,13 @@ def read_positions(
     """
     latitudes, longitudes = _read_angles(table, lat), _read_angles(table, lon)
     latitude, longitude = np.abs(latitudes), np.abs(longitudes)
-    is_beyond = (latitude > 90.0) | (longitude > 180.0)
-    is_written = np.isin(latitude, (91.0, 99.0, 999.0, 9999.0))
-    is_written |= np.isin(longitude, (181.0, 999.0, 9999.0))
-    none: Flags = is_beyond & is_written
+    none: Flags = np.isin(latitude, (91.0, 99.0, 999.0, 9999.0))
+    none |= np.isin(longitude, (181.0, 999.0, 9999.0))
 
     sum_of_both = latitude + longitude
     is_zero = sum_of_both == 0.0
-    others = sum_of_both[np.isfinite(sum_of_both) & ~is_zero]
-    if others.size and others.min() > 1.0:
+    others = sum_of_both[~is_zero]
+    if np.nanmin(others, initial=np.inf) > 1.0:
         none |= is_zero
     latitudes[none] = longitudes[none] = np.nan
     return latitudes, longitudes, int(none.sum())
@@ -155,29 +113,25 @@ def _read_angles(table: LogTable, column: Column) -> Floats:
     cell that is none of these.
     """
     plain = table.plain_numbers(column.name)
-    if plain is not None and column.unit == "deg":
-        have_minutes = np.nanmax(np.abs(plain), initial=0.0) >= 1000.0
-        if not have_minutes:
-            return plain.copy()
+    largest = 0.0 if plain is None else np.nanmax(np.abs(plain), initial=0.0)
+    if plain is not None and column.unit == "deg" and largest < 1000.0:
+        return plain.copy()
     cells = table.texts(column.name)
     matches = [_ANGLE.fullmatch(cell) for cell in cells]
     has_minutes = column.unit != "deg" or any(
         re.match(r"\d{4}", match["degrees"]) for match in matches if match
     )
-    angles = np.full(len(cells), np.nan)
-    for row, (cell, match) in enumerate(zip(cells, matches, strict=True)):
-        if not cell:
-            continue
-        angle = None if match is None else _degrees(match, has_minutes)
-        if angle is None and is_number(cell):  # such as 1e-05
-            return table.numbers(column.name)
-        if angle is None:
-            raise InputError(
-                f"{table.cell(row, column.name)}: expected degrees (57.6872), degrees"
-                f" and minutes (57°41.234'N) or ddmm.mmm (5741.234N), got {cell!r}"
-            )
-        angles[row] = angle
-    return angles
+    angles = [match and _degrees(match, has_minutes) for match in matches]
+    unread = [k for k, cell in enumerate(cells) if cell and angles[k] is None]
+    if not unread:
+        return np.array(angles, dtype=np.float64)
+    row = unread[0]
+    if is_number(cells[row]):  # such as 1e-05
+        return table.numbers(column.name)
+    raise InputError(
+        f"{table.cell(row, column.name)}: expected degrees (57.6872), degrees and"
+        f" minutes (57°41.234'N) or ddmm.mmm (5741.234N), got {cells[row]!r}"
+    )
 
 
 def _degrees(match: re.Match[str], has_minutes: bool) -> float | None:

@@ -26,12 +26,11 @@ class Column:
 
     name: str  # of the column
     unit: str = ""  # none: as the reader knows it, else the SI unit
-    date: str | None = None  # column of the date or of the GPS week
+    date: str | None = None  # column of the date
     zone: str = "UTC"  # how far the clock is ahead of UTC, as "+02:00"
     nanoseconds: str | None = None  # column of what is to be added to whole seconds
     minus: str | None = None  # column that is subtracted: of the other propeller
     neutral: float = 0.0  # number of a steering command that steers straight
-    mean_with: str | None = None  # column of the other rudder
     full: float | None = None  # change of the command that counts as 35 deg of rudder
     quaternion: tuple[str, ...] | None = None  # columns of x, y and z, beside that of w
     file: str | None = None  # of several that are one log, where more have the column
@@ -68,6 +67,15 @@ class Locator:
         return f'{channel} = {{ column = "{name}", unit = "{unit}" }}'
 
 
+#: Keys of the column of a channel, beside those of each.
+_KEYS = {
+    "t": ["date", "zone", "nanoseconds"],
+    "psi": ["quaternion"],
+    "delta": ["minus", "neutral", "full"],
+    "delta_command": ["minus", "neutral", "full"],
+}
+
+
 def parse_columns(
     columns: Mapping[str, Any], where: str = "columns"
 ) -> dict[str, Column]:
@@ -78,53 +86,59 @@ def parse_columns(
     the time may also have ``"date"``, the column of the date, ``"nanoseconds"`` and
     ``"zone"``, that of the heading ``"quaternion"``, the columns of x, y and z beside
     that of w, that of the rudder ``"full"``, ``"neutral"`` and ``"minus"``, which make
-    a steering command, or ``"mean_with"``, the column of a second rudder. `where`
-    begins the messages. Raises InputError for an unknown channel, key or unit, and for
-    a unit of another quantity.
+    a steering command. `where` begins the messages. Raises InputError for an unknown
+    channel, key or unit, a unit of another quantity, and a column that is given twice.
     """
     check_table(columns, where)
-    parsed = {}
+    parsed: dict[str, Column] = {}
     for channel, entry in columns.items():
         check_channel(channel, where)
-        place = f"{where} {channel}"
-        parsed[channel] = _parse_column(channel, entry, place)
+        column = _parse_column(channel, entry, f"{where} {channel}")
+        for other, known in parsed.items():
+            if (known.name, known.file) == (column.name, column.file):
+                raise InputError(
+                    f"{where}: expected each column once, got '{column.name}' for"
+                    f" {other} and {channel}; name the column of each"
+                )
+        parsed[channel] = column
     return parsed
 
 
 def _parse_column(channel: str, entry: Any, where: str) -> Column:
     fields = dict(entry) if isinstance(entry, Mapping) else {"column": entry}
-    keys = ["column", "unit", "file"]
-    if channel == "t":
-        keys += ["date", "zone", "nanoseconds"]
-    if channel in ("delta", "delta_command"):
-        keys += ["mean_with", "minus", "neutral", "full"]
-    if channel == "psi":
-        keys += ["quaternion"]
-    check_keys(fields, keys, where)
+    check_keys(fields, ["column", "unit", "file", *_KEYS.get(channel, [])], where)
     name = fields.pop("column", None)
     if not isinstance(name, str):
-        unit = si_unit(channel)
         raise InputError(
             f"{where}: expected the name of a column or"
-            f' {{ column = "name", unit = "{unit}" }}, got {entry!r}'
+            f' {{ column = "name", unit = "{si_unit(channel)}" }}, got {entry!r}'
         )
-
     check_text(name, where)
     if "unit" in fields:
         si_factor(channel, fields["unit"], where)
-    command = _steering_command(fields, where)
-    if "quaternion" in fields:
-        command["quaternion"] = _quaternion(fields, where)
-    for field in fields.values():
-        check_text(field, where)
     if "zone" in fields:
-        zone_seconds(fields["zone"], f"{where} zone")
-    return Column(name.strip(), **fields, **command)
+        zone_seconds(check_text(fields["zone"], where), f"{where} zone")
+    for key, value in fields.items():
+        if key in ("neutral", "full"):
+            fields[key] = check_number(value, f"{where} {key}")
+        elif key == "quaternion":
+            fields[key] = _three_names(value, where)
+        else:
+            check_text(value, f"{where} {key}")
+    is_command = not fields.keys().isdisjoint(("neutral", "full", "minus"))
+    if is_command and (not fields.get("full") or fields.get("unit", "deg") != "deg"):
+        raise InputError(
+            f"{where}: expected full, the change of the command that counts as 35 deg"
+            " of rudder, not zero, and no unit, with neutral or minus; give full, such"
+            " as 400 of a pulse width in us"
+        )
+    if is_command:
+        fields["unit"] = "deg"
+    return Column(name.strip(), **fields)
 
 
-def _quaternion(fields: dict[str, Any], where: str) -> tuple[str, ...]:
-    """Take the columns of x, y and z out of the fields of the column of w, checked."""
-    names = fields.pop("quaternion")
+def _three_names(names: Any, where: str) -> tuple[str, ...]:
+    """The columns of x, y and z of a quaternion."""
     are_three = isinstance(names, list | tuple) and len(names) == 3
     if not are_three or not all(isinstance(name, str) for name in names):
         raise InputError(
@@ -132,30 +146,6 @@ def _quaternion(fields: dict[str, Any], where: str) -> tuple[str, ...]:
             f' in column, such as ["q[1]", "q[2]", "q[3]"], got {names!r}'
         )
     return tuple(name.strip() for name in names)
-
-
-def _steering_command(fields: dict[str, Any], where: str) -> dict[str, Any]:
-    """Take what makes a steering command out of the fields of a column, checked."""
-    command: dict[str, Any] = {}
-    for key in ("neutral", "full"):
-        if key in fields:
-            command[key] = check_number(fields.pop(key), f"{where} {key}")
-    if "minus" in fields:
-        command["minus"] = check_text(fields.pop("minus"), f"{where} minus")
-    if command and not command.get("full"):
-        raise InputError(
-            f"{where}: expected full, the change of the command that counts as 35 deg"
-            " of rudder, not zero, with neutral or minus, got none; give full, such as"
-            " 400 of a pulse width in us"
-        )
-    if command:
-        if fields.get("unit", "deg") != "deg":
-            raise InputError(
-                f"{where} unit: expected deg with full, got {fields['unit']!r}; leave"
-                " out the unit"
-            )
-        fields["unit"] = "deg"
-    return command
 
 
 def choose_columns(
@@ -167,41 +157,23 @@ def choose_columns(
     named like a channel. Of a `part` of a log, columns that are not there are left out;
     else they are an InputError.
     """
+    channels = quoted(QUANTITIES)
     if columns is None:
-        columns = _named_like_channels(table)
-    named = {"t": Column("t"), **columns}
+        columns = {name: Column(name) for name in QUANTITIES if name in table.cells}
+        if not columns.keys() - {"t"}:
+            raise InputError(
+                f"{table.path}: no column is named like a channel ({channels})."
+                f" Columns present: {quoted(table.header)}. Name the column of each"
+                " channel in [columns] (or columns=...)"
+            )
     chosen = {}
-    for channel, column in named.items():
-        is_elsewhere = part and not _is_in(table, column)
-        if is_elsewhere and channel != "t":
-            continue
-        known_unit = table.units.get(column.name, si_unit(channel))
-        chosen[channel] = replace(column, unit=column.unit or known_unit)
+    for channel, column in {"t": Column("t"), **columns}.items():
+        is_here = column.name in table.cells and column.file in (None, table.path.name)
+        if is_here or not part or channel == "t":
+            known_unit = table.units.get(column.name, si_unit(channel))
+            chosen[channel] = replace(column, unit=column.unit or known_unit)
     if len(chosen) == 1:
-        channels = quoted(QUANTITIES)
         raise InputError(
             f"{table.path}: columns: expected some of {channels}, got time alone"
         )
     return chosen
-
-
-def _is_in(table: LogTable, column: Column) -> bool:
-    """Return whether a column is to be read from a part of a log."""
-    of_other_file = column.file is not None and column.file != table.path.name
-    return column.name in table.cells and not of_other_file
-
-
-def _named_like_channels(table: LogTable) -> dict[str, Column]:
-    columns = {}
-    for name in QUANTITIES:
-        if name in table.cells:
-            columns[name] = Column(name)
-    if not columns.keys() - {"t"}:
-        channels = quoted(QUANTITIES)
-        present = quoted(table.header)
-        raise InputError(
-            f"{table.path}: no column is named like a channel ({channels})."
-            f" Columns present: {present}. Name the column of each channel"
-            " in [columns] (or columns=...)"
-        )
-    return columns

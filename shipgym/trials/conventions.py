@@ -8,7 +8,6 @@ from typing import Any
 
 from shipgym.checks import check_choice, check_number, check_table
 from shipgym.errors import InputError
-from shipgym.ships.particulars import Particulars
 from shipgym.trials.units import DEGREE
 
 _WORDS = {
@@ -23,63 +22,42 @@ _KEYS = (
     "heading_offset_deg",
     "variation_deg",
     "rudder_offset_deg",
-    "clock_offsets",
 )
 
 
 @dataclass(frozen=True)
 class Installation:
-    """The table ``[sensors]``: antenna, offsets of heading and rudder, late clocks.
+    """The table ``[sensors]``: antenna, offsets of heading and rudder.
 
     Attributes
     ----------
     forward, starboard : float
         The antenna from midship, m.
-    heading_offset : float or "estimate"
+    heading_offset : float
         What the heading shows where the truth is zero, rad, less the magnetic variation
         that is given for it.
     rudder_offset : float
         The same of the rudder, rad.
-    clock_offsets : {"correct", "keep"}, optional
-        By default late channels are corrected where they have clocks of their own, else
-        refused.
     """
 
     forward: float = 0.0
     starboard: float = 0.0
-    heading_offset: float | str = 0.0
+    heading_offset: float = 0.0
     rudder_offset: float = 0.0
-    clock_offsets: str | None = None
 
     @classmethod
-    def from_mapping(
-        cls, table: Any, where: str, ship: Particulars | None = None
-    ) -> Installation:
-        """Check the table ``[sensors]``.
-
-        Raises InputError also for an antenna outside the ship.
-        """
+    def from_mapping(cls, table: Any, where: str) -> Installation:
+        """Check the table ``[sensors]``."""
         check_table(table, where, _KEYS)
-        clocks = table.get("clock_offsets")
-        if clocks is not None:
-            check_choice(clocks, ("correct", "keep"), f"{where} clock_offsets")
         antenna = table.get("gnss_antenna", {})
-        check_table(antenna, f"{where} gnss_antenna", ("forward", "starboard"))
-        heading: float | str = "estimate"
-        if table.get("heading_offset_deg") != "estimate":
-            heading = _radians(table, "heading_offset_deg", where, 'or "estimate"')
-            heading -= _radians(table, "variation_deg", where)
-        elif "variation_deg" in table:
-            raise InputError(
-                f"{where} variation_deg: expected none with heading_offset_deg ="
-                ' "estimate", which includes the variation; leave variation_deg out'
-            )
+        place = f"{where} gnss_antenna"
+        check_table(antenna, place, ("forward", "starboard"))
         return cls(
-            forward=_distance(antenna, "forward", where, ship),
-            starboard=_distance(antenna, "starboard", where, ship),
-            heading_offset=heading,
+            forward=check_number(antenna.get("forward", 0.0), f"{place}.forward"),
+            starboard=check_number(antenna.get("starboard", 0.0), f"{place}.starboard"),
+            heading_offset=_radians(table, "heading_offset_deg", where)
+            - _radians(table, "variation_deg", where),
             rudder_offset=_radians(table, "rudder_offset_deg", where),
-            clock_offsets=clocks,
         )
 
     @property
@@ -88,37 +66,12 @@ class Installation:
         return self.forward == 0.0 and self.starboard == 0.0
 
 
-def _radians(table: Mapping[str, Any], key: str, where: str, hint: str = "") -> float:
+def _radians(table: Mapping[str, Any], key: str, where: str) -> float:
     """An angle in rad, of one in degrees."""
+    degrees = table.get(key, 0.0)
     return DEGREE * check_number(
-        table.get(key, 0.0),
-        f"{where} {key}",
-        at_least=-180.0,
-        at_most=180.0,
-        hint=hint,
+        degrees, f"{where} {key}", at_least=-180.0, at_most=180.0
     )
-
-
-def _distance(
-    antenna: Mapping[str, Any], name: str, where: str, ship: Particulars | None
-) -> float:
-    """Distance of the antenna from midship, forward or to starboard, m."""
-    place = f"{where} gnss_antenna.{name}"
-    distance = check_number(antenna.get(name, 0.0), place)
-    if ship is None:
-        return distance
-    size = ship.length
-    if name == "starboard" and ship.beam:
-        size = ship.beam
-    # a little more than half: antennas stand on bows and bridge wings
-    limit = 0.6 * size
-    if abs(distance) > limit:
-        raise InputError(
-            f"{place}: expected at most {limit:.4g} m from midship, got {distance:g} m,"
-            f" outside the ship of {ship.length:g} m; measured from the aft"
-            f" perpendicular take off {ship.length / 2:g}"
-        )
-    return distance
 
 
 AS_LOGGED = Installation()

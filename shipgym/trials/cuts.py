@@ -1,6 +1,6 @@
 """Parts of a log that are trials: stretches by the clock, or between quiet rudders."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from shipgym.arrays import Floats
 from shipgym.checks import shown
 from shipgym.errors import InputError
 from shipgym.trials.clock_texts import DAY, clock_text, is_dated, read_clock
-from shipgym.trials.resampling import FEWEST_SAMPLES, Log
+from shipgym.trials.resampling import FEWEST_SAMPLES, Log, usual_step
 from shipgym.trials.units import DEGREE
 
 _EXPECTED = (
@@ -19,27 +19,17 @@ _EXPECTED = (
 _SHORTEST = 30.0  # s, of a manoeuvre
 
 
-class Stretch(NamedTuple):
-    """A part of a log between two moments, in seconds of its time or by the clock."""
-
-    first: float | str
-    last: float | str
-
-
 def check_cut(cut: Any, where: str) -> None:
     """Refuse a cut that is neither "rudder" nor a list of pairs of numbers or texts."""
-    if cut == "rudder":
-        return
-    is_list = isinstance(cut, list) and len(cut) > 0
-    if not is_list or not all(_is_stretch(pair) for pair in cut):
-        found = shown(cut)
-        raise InputError(f"{where} cut: {_EXPECTED}, got {found}")
-
-
-def _is_stretch(pair: Any) -> bool:
-    if not isinstance(pair, list) or len(pair) != 2:
-        return False
-    return all(type(moment) in (int, float, str) for moment in pair)
+    pairs = cut if isinstance(cut, list) and cut else [cut]
+    are_pairs = all(
+        isinstance(pair, list)
+        and len(pair) == 2
+        and all(type(moment) in (int, float, str) for moment in pair)
+        for pair in pairs
+    )
+    if cut != "rudder" and not are_pairs:
+        raise InputError(f"{where} cut: {_EXPECTED}, got {shown(cut)}")
 
 
 def cut_log(cut: Any, log: Log, where: str) -> list[slice]:
@@ -48,47 +38,38 @@ def cut_log(cut: Any, log: Log, where: str) -> list[slice]:
     Raises InputError for a part without samples, and for clock times of a log without a
     clock.
     """
+    stretches = cut
     if cut == "rudder":
         stretches = active_stretches(log.t, log.channels.get("delta"))
-        if not stretches:
-            raise InputError(
-                f'{where} cut: expected with "rudder" manoeuvres, in which the rudder'
-                f" is more than 3 deg from its usual place for over {_SHORTEST:g} s,"
-                " got none; give the stretches, or read another log"
-            )
-    else:
-        stretches = [Stretch(first, last) for first, last in cut]
-    parts = []
-    for stretch in stretches:
-        samples = _samples(stretch, log, where)
-        parts.append(samples)
-    return parts
-
-
-def _samples(stretch: Stretch, log: Log, where: str) -> slice:
-    first = _seconds(stretch.first, log, where)
-    last = _seconds(stretch.last, log, where)
-    begin = int(np.searchsorted(log.t, first))
-    end = int(np.searchsorted(log.t, last, side="right"))
-    if end - begin < FEWEST_SAMPLES:
-        span = _span(log)
+    if not stretches:
         raise InputError(
-            f"{where} cut: expected stretches of the log, which goes from {span},"
-            f" got {stretch.first} to {stretch.last}, which holds no trial"
+            f'{where} cut: expected with "rudder" manoeuvres, in which the rudder is'
+            f" more than 3 deg from its usual place for over {_SHORTEST:g} s, got none;"
+            " give the stretches, or read another log"
         )
-    return slice(begin, end)
+    parts = []
+    for moments in stretches:
+        first, last = (_seconds(moment, log, where) for moment in moments)
+        begin = int(np.searchsorted(log.t, first))
+        end = int(np.searchsorted(log.t, last, side="right"))
+        if end - begin < FEWEST_SAMPLES:
+            raise InputError(
+                f"{where} cut: expected stretches of the log, which goes from"
+                f" {_span(log)}, got {moments[0]} to {moments[1]}, which holds no trial"
+            )
+        parts.append(slice(begin, end))
+    return parts
 
 
 def _span(log: Log) -> str:
     """First and last time of a log, in seconds and by its clock."""
-    first = log.t[0]
-    last = log.t[-1]
-    seconds = f"{first:g} to {last:g} s"
+    first, last = log.t[0], log.t[-1]
+    span = f"{first:g} to {last:g} s"
     if log.start is None:
-        return seconds
+        return span
     opening = clock_text(log.start + first)
     closing = clock_text(log.start + last)
-    return f"{seconds}, {opening} to {closing}"
+    return f"{span}, {opening} to {closing}"
 
 
 def _seconds(moment: float | str, log: Log, where: str) -> float:
@@ -112,7 +93,16 @@ def _seconds(moment: float | str, log: Log, where: str) -> float:
     return after - DAY if is_before else after
 
 
-def active_stretches(t: Floats, delta: Floats | None) -> list[Stretch]:
+def runs(t: Floats) -> list[list[float]]:
+    """First and last time, s, of the parts of a log between long gaps."""
+    gap = max(60.0, 20.0 * usual_step(t))
+    is_gap = np.diff(t) > gap
+    starts = np.flatnonzero(is_gap) + 1
+    parts = np.split(t, starts)
+    return [[float(one[0]), float(one[-1])] for one in parts if np.ptp(one) > _SHORTEST]
+
+
+def active_stretches(t: Floats, delta: Floats | None) -> list[list[float]]:
     """Stretches from before a rudder leaves its usual place until it is quiet again.
 
     Time, s, and rudder, rad, of shape (n_samples,); none without a rudder.
@@ -122,15 +112,10 @@ def active_stretches(t: Floats, delta: Floats | None) -> list[Stretch]:
     largest_swing = 3.0 * DEGREE  # of a rudder that is at its usual place
     longest_pause = 60.0  # s, within a manoeuvre
     margin = 30.0  # s, before and after
-    swing = np.abs(delta - np.median(delta))
-    active = t[swing > largest_swing]
-    is_pause = np.diff(active) > longest_pause
-    ends = np.flatnonzero(is_pause) + 1
-
-    stretches = []
-    for moments in np.split(active, ends):
-        if moments.size and np.ptp(moments) > _SHORTEST:
-            first = float(moments[0]) - margin
-            last = float(moments[-1]) + margin
-            stretches.append(Stretch(first, last))
-    return stretches
+    active = t[np.abs(delta - np.median(delta)) > largest_swing]
+    ends = np.flatnonzero(np.diff(active) > longest_pause) + 1
+    return [
+        [float(one[0]) - margin, float(one[-1]) + margin]
+        for one in np.split(active, ends)
+        if one.size and np.ptp(one) > _SHORTEST
+    ]

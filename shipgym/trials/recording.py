@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from shipgym.errors import InputError
 from shipgym.trials.column_values import (
     column_numbers,
     read_positions,
-    two_rudders_note,
     without_sentinels,
 )
 from shipgym.trials.columns import Column, Locator, choose_columns
@@ -21,7 +20,6 @@ from shipgym.trials.plausibility.values import (
     check_heading,
     check_ranges,
     find_outliers,
-    without_clock_jumps,
     without_spikes,
 )
 from shipgym.trials.readers.log_table import REPAIR, LogTable
@@ -33,8 +31,6 @@ from shipgym.trials.resampling import (
 )
 from shipgym.trials.row_times import read_times
 from shipgym.trials.units import si_factor
-
-_PAIRS = {"lat": "lon", "lon": "lat", "sog": "cog", "cog": "sog"}  # of no use alone
 
 
 @dataclass(frozen=True)
@@ -53,14 +49,14 @@ class Recording:
         Clock at t = 0 in UTC, s since 1970 or of the day; None where the time is no
         clock's.
     notes : list of str
-        What was assumed of the values.
+        What was left out, and what was assumed of the values.
     """
 
     signals: Signals
     locator: Locator
     filled: Mapping[str, int]
     start: float | None
-    notes: list[str] = field(default_factory=list)
+    notes: list[str]
 
 
 def read_recording(
@@ -76,22 +72,19 @@ def read_recording(
     wrong with a file is an InputError that names line, column, value and remedy.
     """
     chosen = choose_columns(table, columns, part=part)
-    if _PAIRS.keys() & chosen.keys():
-        _check_pairs(table, chosen)
-    notes: list[str] = []
+    if ("lat" in chosen) != ("lon" in chosen):
+        alone = "lat" if "lat" in chosen else "lon"
+        raise InputError(
+            f"{table.path}: columns: expected lat and lon, got {alone} alone; name the"
+            " column of the other"
+        )
     if repair is not None:
-        known = len(table.notes)
         names = [column.name for column in chosen.values()]
         table = table.without_odd_cells(names, chosen["t"].name)
-        notes += table.notes[known:]
+    notes = [*table.notes, *_settle_speed(chosen)]
     times = read_times(table, chosen["t"])
     chosen["t"] = replace(chosen["t"], unit=times.unit)
-    locator = Locator(
-        table=table,
-        columns=chosen,
-        rows=np.arange(times.t.size),
-    )
-
+    locator = Locator(table, chosen, rows=np.arange(times.t.size))
     notes += times.notes
     channels = _read_numbers(locator, notes)
     outliers = 0
@@ -101,32 +94,32 @@ def read_recording(
         chosen["x"] = replace(chosen["lat"], unit="m")
         chosen["y"] = replace(chosen["lon"], unit="m")
 
-    t = times.t
-    if {"x", "y"} <= channels.keys():
-        t, jumps = without_clock_jumps(t, channels["x"], channels["y"])
-        notes += jumps
-    signals, locator, filled = _signals(t, channels, locator, repair)
+    signals, locator, filled = _signals(times.t, channels, locator, repair)
     if outliers:
         filled |= {"x": outliers, "y": outliers}
     if "sog" in signals:
-        _make_velocity(signals, locator)
-    return Recording(
-        signals=signals,
-        locator=locator,
-        filled=filled,
-        start=times.start,
-        notes=notes,
-    )
+        _make_velocity(signals)
+    return Recording(signals, locator, filled, times.start, notes)
 
 
-def _check_pairs(table: LogTable, chosen: Mapping[str, Column]) -> None:
-    """Refuse one channel of a pair without the other."""
-    for name, other in _PAIRS.items():
-        if name in chosen and other not in chosen:
-            raise InputError(
-                f"{table.path}: columns: expected {name} and {other}, got {name} alone;"
-                " name the column of the other"
-            )
+def _settle_speed(chosen: dict[str, Column]) -> list[str]:
+    """Leave out a course alone, and a speed over ground alone where more is known.
+
+    Such a speed is else taken as through the water, which a note says.
+    """
+    if {"sog", "cog"} <= chosen.keys():
+        return []
+    chosen.pop("cog", None)
+    alone = chosen.pop("sog", None)
+    if alone is None:
+        return []
+    if {"lat", "x", "stw", "u"} & chosen.keys():
+        return ["the speed over ground has no course beside it and is left out"]
+    chosen["stw"] = alone
+    return [
+        "the speed over ground is taken as through the water, as there is no course"
+        " over ground"
+    ]
 
 
 def _read_numbers(locator: Locator, notes: list[str]) -> dict[str, Floats]:
@@ -136,15 +129,18 @@ def _read_numbers(locator: Locator, notes: list[str]) -> dict[str, Floats]:
     """
     channels = {}
     for channel, column in locator.columns.items():
-        if channel in ("t", "lat", "lon"):
-            continue
-        numbers = column_numbers(locator.table, column)
-        factor = si_factor(channel, column.unit)
-        values, words = without_sentinels(channel, numbers, factor)
-        if column.mean_with is not None:
-            notes.append(two_rudders_note(locator.table, column))
-        notes += [f"column '{column.name}': {word}" for word in words]
-        channels[channel] = factor * values
+        if channel not in ("t", "lat", "lon"):
+            numbers = column_numbers(locator.table, column)
+            factor = si_factor(channel, column.unit)
+            values, words = without_sentinels(channel, numbers, factor)
+            notes += [f"column '{column.name}': {word}" for word in words]
+            channels[channel] = factor * values
+    if "sog" in channels:  # at rest there is no course
+        sog = channels["sog"]
+        cog = channels["cog"]
+        lacks_one = np.isnan(sog + cog)
+        sog[lacks_one] = np.nan
+        cog[lacks_one] = np.nan
     return channels
 
 
@@ -156,47 +152,43 @@ def _signals(
     The channels are on the clock of the rows, or each on a clock of its own.
     """
     filled: dict[str, int] = {}
-    signals: Signals = {}
     if "psi" in channels:
         channels["psi"], spikes = without_spikes(channels["psi"])
         if spikes:
             filled["psi"] = spikes
-    table = {"t": t, **channels}
-    columns = np.array(list(table.values()))
-    is_whole = bool(np.isfinite(columns).all())
+    is_whole = bool(np.isfinite([t, *channels.values()]).all())
     own_clocks = locator.table.own_clocks or have_own_clocks(t, channels)
     if not is_whole and own_clocks:
-        check_ranges(table, locator)
-        for channel, values in channels.items():
-            signals[channel] = _own_signal(channel, t, values, locator)
-        return signals, locator, filled
-
+        return _own_signals(t, channels, locator), locator, filled
     if is_whole:
         check_time(t, locator)
     else:
         t, channels, locator, missing = fill_missing(t, channels, locator, repair)
         filled = dict(Counter(filled) + Counter(missing))
     check_ranges({"t": t, **channels}, locator)
-    for channel, values in channels.items():
-        continuous = _continuous(channel, t, values, locator)
-        signals[channel] = Signal(t, continuous)
+    signals = {}
+    for name, values in channels.items():
+        continuous = _continuous(name, t, values, locator)
+        signals[name] = Signal(t, continuous)
     return signals, locator, filled
 
 
-def _continuous(
-    channel: str,
-    t: Floats,
-    values: Floats,
-    locator: Locator,
-) -> Floats:
+def _own_signals(t: Floats, channels: dict[str, Floats], locator: Locator) -> Signals:
+    check_ranges({"t": t, **channels}, locator)
+    signals = {}
+    for name, values in channels.items():
+        signals[name] = _own_signal(name, t, values, locator)
+    return signals
+
+
+def _continuous(channel: str, t: Floats, values: Floats, locator: Locator) -> Floats:
     """Values of a channel, headings and directions of the wind without jumps."""
-    if channel == "wind_from":
-        return np.unwrap(values)
+    if channel not in ("psi", "wind_from"):
+        return values
+    unwrapped = np.unwrap(values)
     if channel == "psi":
-        unwrapped = np.unwrap(values)
         check_heading(t, unwrapped, values, locator)
-        return unwrapped
-    return values
+    return unwrapped
 
 
 def _local_track(
@@ -216,17 +208,14 @@ def _local_track(
     check_ranges({"lat": lat, "lon": lon}, locator)
     north = np.full_like(t, np.nan)
     east = np.full_like(t, np.nan)
-    is_known = np.isfinite(lat + lon + t)
-    rows = np.flatnonzero(is_known)
+    rows = np.flatnonzero(np.isfinite(lat + lon + t))
     if not rows.size:
         return north, east, 0
 
-    lat = lat[rows]
-    lon = lon[rows]
-    clock = t[rows]
+    lat, lon = lat[rows], lon[rows]
     here = replace(locator, rows=rows)
     x, y = local_metres(lat, lon, origin=(lat[0], lon[0]))
-    is_far = find_outliers(clock, x, y, here)
+    is_far = find_outliers(t[rows], x, y, here)
     if repair is None and is_far.any():
         k = int(np.argmax(is_far))
         raise InputError(
@@ -236,22 +225,14 @@ def _local_track(
             ' or leave such rows to be filled with repair = "interpolate"',
             [REPAIR],
         )
-    is_near = ~is_far
-    kept = rows[is_near]
-    north[kept] = x[is_near]
-    east[kept] = y[is_near]
+    north[rows[~is_far]] = x[~is_far]
+    east[rows[~is_far]] = y[~is_far]
     return north, east, int(is_far.sum())
 
 
-def _own_signal(
-    channel: str,
-    t: Floats,
-    values: Floats,
-    locator: Locator,
-) -> Signal:
+def _own_signal(channel: str, t: Floats, values: Floats, locator: Locator) -> Signal:
     """A channel where it has values; InputError for too few or time that goes back."""
-    is_present = np.isfinite(values)
-    rows = np.flatnonzero(is_present)
+    rows = np.flatnonzero(np.isfinite(values))
     column = locator.columns[channel].name
     if rows.size < FEWEST_SAMPLES:
         raise InputError(
@@ -263,28 +244,18 @@ def _own_signal(
     here = replace(locator, rows=locator.rows[rows])
     stands_still = np.diff(clock) <= 0.0
     if stands_still.any():
-        k = np.argmax(stands_still)
-        before, after = clock[k : k + 2]
-        place = here.place(k + 1, "t")
+        k = int(np.argmax(stands_still))
         raise InputError(
-            f"{place}: expected time to increase between values of"
-            f" '{column}', got {before:.10g} and then {after:.10g} s; sort the rows,"
-            " or, where two ships or receivers are in the file, keep those of one"
+            f"{here.place(k + 1, 't')}: expected time to increase between values of"
+            f" '{column}', got {clock[k]:.10g} and then {clock[k + 1]:.10g} s; sort the"
+            " rows, or, where two ships or receivers are in the file, keep those of one"
         )
-    present = _continuous(channel, clock, values[rows], here)
-    return Signal(clock, present)
+    return Signal(clock, _continuous(channel, clock, values[rows], here))
 
 
-def _make_velocity(signals: Signals, locator: Locator) -> None:
+def _make_velocity(signals: Signals) -> None:
     """Replace speed and course over ground by velocities to the north and east."""
     t, speed = signals.pop("sog")
     _, course = signals.pop("cog")
-    if speed.size != course.size:
-        raise InputError(
-            f"{locator.path}: expected sog and cog in the same rows, got {speed.size}"
-            f" values of sog and {course.size} of cog"
-        )
-    north = speed * np.cos(course)
-    east = speed * np.sin(course)
-    signals["ground_north"] = Signal(t, north)
-    signals["ground_east"] = Signal(t, east)
+    signals["ground_north"] = Signal(t, speed * np.cos(course))
+    signals["ground_east"] = Signal(t, speed * np.sin(course))

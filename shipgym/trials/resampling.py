@@ -82,23 +82,11 @@ def have_own_clocks(t: Floats, channels: Mapping[str, Floats]) -> bool:
     rows or more apart as a rule.
     """
     # flags of shape (n_channels, n_rows)
-    is_present = np.isfinite(list(channels.values()))
-    has_value = is_present.any(axis=0)
-    has_time = np.isfinite(t)
-    is_whole = has_time & has_value
-    if not is_whole.all():
+    is_present = np.isfinite([*channels.values()])
+    if not (np.isfinite(t) & is_present.any(axis=0)).all():
         return False
-    for of_channel in is_present:
-        rows = np.flatnonzero(of_channel)
-        if rows.size >= FEWEST_SAMPLES and usual_step(rows) >= 2.0:
-            return True
-    return False
-
-
-def share_clock(signals: Mapping[str, Signal]) -> bool:
-    """Return whether all channels were logged by one and the same clock."""
-    clocks = {id(signal.t) for signal in signals.values()}
-    return len(clocks) == 1
+    rows = [np.flatnonzero(of_channel) for of_channel in is_present]
+    return any(one.size >= FEWEST_SAMPLES and usual_step(one) >= 2.0 for one in rows)
 
 
 def on_one_clock(signals: Mapping[str, Signal], where: str) -> Log:
@@ -109,90 +97,49 @@ def on_one_clock(signals: Mapping[str, Signal], where: str) -> Log:
     in one of the motion's channels stays a hole. Raises InputError where too few
     moments are left.
     """
-    if not share_clock(signals):
-        return _resampled(signals, where)
-    channels = {}
-    for name, signal in signals.items():
-        t = signal.t
-        channels[name] = signal.values
-    return Log(
-        t=t,
-        channels=channels,
-        where=where,
-        notes=[],
-    )
+    first, *others = signals.values()
+    if all(one.t is first.t for one in others):
+        channels = {name: signal.values for name, signal in signals.items()}
+        return Log(first.t, channels, where, notes=[])
 
-
-def _resampled(signals: Mapping[str, Signal], where: str) -> Log:
-    clocks = _motion_clocks(signals)
-    t = max(clocks.values(), key=_slowness)
+    # between samples of the motion nothing is invented
+    motion = {"x", "ground_north", "u", "psi", "r", "delta"} & signals.keys()
+    clocks = {name: signals[name].t for name in signals if name in motion or not motion}
+    # to a millisecond; of equal ones the clock with fewer holes
+    t = max(clocks.values(), key=lambda t: (round(usual_step(t), 3), t.size))
     # a longer one is a hole
     longest_step = 6.0 * usual_step(t)
-
     is_known = np.ones(t.size, dtype=bool)
     notes = []
     for name, clock in clocks.items():
         steps = np.diff(clock)
         is_hole = steps > longest_step
         is_known &= _inside(t, clock, is_hole)
-        count = np.count_nonzero(is_hole)
-        if count:
-            longest = steps.max()
+        if is_hole.any():
             notes.append(
-                f"{name} has {count} holes, of up to {longest:.4g} s;"
+                f"{name} has {is_hole.sum()} holes, of up to {steps.max():.4g} s;"
                 " nothing is put there"
             )
 
     t = t[is_known]
     if t.size < FEWEST_SAMPLES:
-        names = ", ".join(clocks)
         raise InputError(
             f"{where}: expected channels of one time, got {t.size} moments that"
-            f" {names} have in common; check their clocks"
+            f" {', '.join(clocks)} have in common; check their clocks"
         )
-    channels = {}
-    for name, signal in signals.items():
-        channels[name] = np.interp(t, signal.t, signal.values)
-    return Log(
-        t=t,
-        channels=channels,
-        where=where,
-        notes=notes,
-    )
-
-
-def _slowness(t: Floats) -> tuple[float, int]:
-    """Usual step to a millisecond, s; of equal ones the clock with fewer holes."""
-    return round(usual_step(t), 3), t.size
-
-
-def _motion_clocks(signals: Mapping[str, Signal]) -> dict[str, Floats]:
-    """Clocks of the motion's channels, between whose samples nothing is invented.
-
-    Those of all channels where there is none of the motion.
-    """
-    motion = {"x", "ground_north", "u", "psi", "r", "delta"}
-    all_clocks = {}
-    of_motion = {}
-    for name, signal in signals.items():
-        all_clocks[name] = signal.t
-        if name in motion:
-            of_motion[name] = signal.t
-    return of_motion or all_clocks
+    channels = {
+        name: np.interp(t, signal.t, signal.values) for name, signal in signals.items()
+    }
+    return Log(t, channels, where, notes)
 
 
 def _inside(t: Floats, clock: Floats, is_hole: Flags) -> Flags:
     """Flags of times within a clock's span and in none of its holes."""
-    after = np.searchsorted(clock, t)
-    after = np.clip(after, 1, clock.size - 1)
+    after = np.clip(np.searchsorted(clock, t), 1, clock.size - 1)
     before = after - 1
-    is_after = t > clock[before]
-    is_before = t < clock[after]
-    in_hole = is_hole[before] & is_after & is_before
-
+    in_hole = is_hole[before] & (t > clock[before]) & (t < clock[after])
     # sentences of one moment are logged one after the other
     tolerance = 0.1 * usual_step(t) if t.size > 1 else 0.0
     has_begun = t >= clock[0] - tolerance
-    has_ended = t > clock[-1] + tolerance
-    inside: Flags = has_begun & ~has_ended & ~in_hole
+    inside: Flags = has_begun & (t <= clock[-1] + tolerance) & ~in_hole
     return inside

@@ -104,14 +104,25 @@ class ShipFile:
             raise InputError(self.undecided[0])
         if use is not None:
             check_choice(use, USES, f"{self.path}: trials(use)")
-        wanted = [use]
-        if use is None:
-            wanted = [name for name in USES if name != "skip"]
         trials = []
         for entry in self.entries:
-            if entry.use in wanted:
+            is_wanted = entry.use == use
+            if use is None:
+                is_wanted = entry.use != "skip"
+            if is_wanted:
                 trials += self._read(entry)
         return trials
+
+    def faults(self) -> list[str]:
+        """What is left to decide, and what is wrong with each log; empty if nothing."""
+        faults = [*self.undecided]
+        for entry in self.entries:
+            try:
+                if entry.use != "skip":
+                    self._read(entry)
+            except InputError as error:
+                faults.append(str(error))
+        return faults
 
     def trial(self, file: str) -> Trial:
         """Read one trial by its ``file``, whatever its use; of a cut log the first."""

@@ -27,12 +27,18 @@ from shipgym.files import write_text
 from shipgym.trials.columns import parse_columns
 from shipgym.trials.conventions import Conventions, Installation
 from shipgym.trials.cuts import cut_log
+from shipgym.trials.plausibility.agreement import rate_gain
 from shipgym.trials.readers.frames import read_frame
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.resampling import FEWEST_SAMPLES, Log
 from shipgym.trials.trial_import import import_tables
-from shipgym.trials.units import CHANNELS, check_channel
+from shipgym.trials.units import (
+    CHANNELS,
+    DEGREE,
+    LARGEST_MAGNITUDES,
+    check_channel,
+)
 
 #: Kinds of manoeuvre that a trial may name.
 KINDS = (
@@ -129,7 +135,16 @@ class Trial:
         where = f"trial '{name}'"
         times = _frozen_array(t, f"{where}: t")
         _check_time(times, where)
-        arrays = _frozen_channels(channels, times.shape, where)
+        if not channels:
+            raise InputError(
+                f"{where}: expected at least one channel of {quoted(CHANNELS)}, got"
+                " none"
+            )
+        arrays = {}
+        for channel, values in channels.items():
+            check_channel(channel, where, time=False)
+            arrays[channel] = _frozen_array(values, f"{where}: {channel}", times.size)
+        _check_angles(times, arrays, where)
         unknown = sorted(set(derived) - arrays.keys())
         if unknown:
             raise InputError(
@@ -179,13 +194,9 @@ class Trial:
     def sha256(self) -> str:
         """Hash of time and channels, independent of formatting, name, kind and use."""
         digest = hashlib.sha256()
-        names = sorted(self.channels)
-        for name in ("t", *names):
-            values = self[name].astype("<f8")
-            encoded = name.encode()
-            digest.update(encoded)
-            digest.update(b"\0")
-            digest.update(values.tobytes())
+        for name in ("t", *sorted(self.channels)):
+            digest.update(name.encode() + b"\0")
+            digest.update(self[name].astype("<f8").tobytes())
         return digest.hexdigest()
 
     def __len__(self) -> int:
@@ -201,26 +212,18 @@ class Trial:
         if channel == "t":
             return self.t
         if channel not in self.channels:
-            raise self._no_channel(channel)
+            hint = did_you_mean(str(channel), self.channels)
+            raise InputError(
+                f"trial '{self.name}': no channel '{channel}'.{hint} Channels present:"
+                f" {quoted(self.channels)}"
+            )
         return self.channels[channel]
 
-    def _no_channel(self, channel: str) -> InputError:
-        hint = did_you_mean(str(channel), self.channels)
-        present = quoted(self.channels)
-        return InputError(
-            f"trial '{self.name}': no channel '{channel}'.{hint} Channels present:"
-            f" {present}"
-        )
-
     def __repr__(self) -> str:
-        channels = list(self.channels)
         return (
-            f"Trial(name={self.name!r},"
-            f" kind={self.kind!r},"
-            f" use={self.use!r},"
-            f" samples={len(self)},"
-            f" duration={self.duration:g} s,"
-            f" channels={channels})"
+            f"Trial(name={self.name!r}, kind={self.kind!r}, use={self.use!r},"
+            f" samples={len(self)}, duration={self.duration:g} s,"
+            f" channels={list(self.channels)})"
         )
 
     def _settings(self) -> dict[str, Any]:
@@ -241,16 +244,13 @@ class Trial:
     def with_(self, **changes: Any) -> Trial:
         """Return a copy with a changed name, kind, use, length or ``over_ground``."""
         known = ["name", "kind", "use", "length", "over_ground"]
-        unknown = changes.keys() - known
+        unknown = sorted(changes.keys() - known)
         if unknown:
-            wrong = quoted(sorted(unknown))
-            names = ", ".join(known)
             raise InputError(
-                f"trial '{self.name}': cannot change {wrong}, only {names}"
+                f"trial '{self.name}': cannot change {quoted(unknown)}, only"
+                f" {', '.join(known)}"
             )
-        settings = self._settings()
-        settings |= changes
-        return Trial(self.t, self.channels, **settings)
+        return Trial(self.t, self.channels, **(self._settings() | changes))
 
     def with_channels(
         self,
@@ -264,25 +264,15 @@ class Trial:
         With other times `t`, s, all channels are given. `repaired` counts filled values
         by channel, on top of those filled before. Raises InputError as for a new trial.
         """
-        settings = self._settings()
-        settings["raw"] = self
-        if repaired:
-            before = Counter(self.repaired)
-            settings["repaired"] = before + Counter(repaired)
+        counts = Counter(self.repaired) + Counter(repaired)
+        settings = self._settings() | {"raw": self, "repaired": counts}
         times = self.t if t is None else t
-        changed = {**self.channels, **channels}
-        return Trial(times, changed, **settings)
+        return Trial(times, {**self.channels, **channels}, **settings)
 
     def part(self, rows: slice, name: str | None = None) -> Trial:
         """Trial of some samples, without kind and use, by the same or another name."""
-        channels = {}
-        for channel, values in self.channels.items():
-            channels[channel] = values[rows]
-        return Trial(
-            self.t[rows],
-            channels,
-            name=self.name if name is None else name,
-        )
+        channels = {name: values[rows] for name, values in self.channels.items()}
+        return Trial(self.t[rows], channels, name=self.name if name is None else name)
 
     @classmethod
     def from_csv(
@@ -340,11 +330,6 @@ class Trial:
             The table ``[sensors]`` of a ship file.
         """
         where = f"{path.path if isinstance(path, LogTable) else path}:"
-        installation = Installation.from_mapping(sensors or {}, f"{where} sensors")
-        table = read_log(path)
-        chosen = None
-        if columns is not None:
-            chosen = parse_columns(columns, f"{where} columns")
         conventions = Conventions(
             rudder_positive=rudder_positive,
             velocity_frame=velocity_frame,
@@ -353,8 +338,10 @@ class Trial:
             xg=xg,
             repair=repair,
             where=where,
-            installation=installation,
+            installation=Installation.from_mapping(sensors or {}, f"{where} sensors"),
         )
+        table = read_log(path)
+        chosen = None if columns is None else parse_columns(columns, f"{where} columns")
         log = import_tables([table], chosen, conventions)
         own_name = table.path.name if name is None else name
         return trial_of(log, own_name, kind=kind, use=use, length=length)
@@ -380,24 +367,16 @@ class Trial:
         cannot be written.
         """
         names = ["t", *self.channels]
-        columns = [self[name] for name in names]
-        lines = [",".join(names)]
-        for row in np.column_stack(columns).tolist():
-            line = ",".join(map(repr, row))
-            lines.append(line)
-        lines.append("")
-        text = "\n".join(lines)
-        write_text(text, Path(path))
+        rows = np.column_stack([self[name] for name in names]).tolist()
+        lines = [",".join(names), *(",".join(map(repr, row)) for row in rows), ""]
+        write_text("\n".join(lines), Path(path))
 
 
 def trial_of(log: Log, name: str, samples: slice = slice(None), **facts: Any) -> Trial:
     """Trial of some samples of a log; `facts` are its kind, use and length."""
-    channels = {}
-    for channel, values in log.channels.items():
-        channels[channel] = values[samples]
     return Trial(
         log.t[samples],
-        channels,
+        {channel: values[samples] for channel, values in log.channels.items()},
         name=name,
         derived=log.derived,
         repaired=log.repaired,
@@ -410,45 +389,13 @@ def trial_of(log: Log, name: str, samples: slice = slice(None), **facts: Any) ->
 
 def cut_trials(cut: Any, log: Log, name: str, where: str, **facts: Any) -> list[Trial]:
     """Trials of the stretches of a cut log (:func:`.cut_log`), named by seconds."""
-    trials = []
-    for samples in cut_log(cut, log, where):
-        t = log.t[samples]
-        own_name = f"{name} {t[0]:.0f}-{t[-1]:.0f} s"
-        trial = trial_of(log, own_name, samples, **facts)
-        trials.append(trial)
-    return trials
-
-
-def _frozen_channels(
-    channels: Mapping[str, npt.ArrayLike], shape: tuple[int, ...], where: str
-) -> dict[str, Floats]:
-    """Channels as read-only arrays, their names and lengths checked."""
-    if not channels:
-        raise InputError(
-            f"{where}: expected at least one channel of {quoted(CHANNELS)}, got none"
-        )
-    arrays = {}
-    for channel, values in channels.items():
-        check_channel(channel, where, time=False)
-        array = _frozen_array(values, f"{where}: {channel}")
-        arrays[channel] = array
-        if array.shape != shape:
-            raise InputError(
-                f"{where}: {channel}: expected {shape[0]} samples as in t, got"
-                f" {array.size}"
-            )
-    return arrays
-
-
-def _frozen_array(values: npt.ArrayLike, where: str) -> Floats:
-    """Return `values` as a read-only copy of shape (n_samples,), all finite."""
-    hint = 'leave such samples out, or import the file with repair = "interpolate"'
-    array = check_finite(values, where, hint)
-    if array.ndim != 1:
-        raise InputError(
-            f"{where}: expected an array of shape (n_samples,), got {array.shape}"
-        )
-    return array
+    parts = cut_log(cut, log, where)
+    spans = [log.t[samples][[0, -1]].round().astype(int) for samples in parts]
+    names = [f"{name} {first}-{last} s" for first, last in spans]
+    return [
+        trial_of(log, own_name, samples, **facts)
+        for own_name, samples in zip(names, parts, strict=True)
+    ]
 
 
 def _check_time(t: Floats, where: str) -> None:
@@ -456,13 +403,46 @@ def _check_time(t: Floats, where: str) -> None:
         raise InputError(
             f"{where}: expected at least {FEWEST_SAMPLES} samples, got {t.size}"
         )
-    steps = np.diff(t)
-    stands_still = steps <= 0.0
+    stands_still = np.diff(t) <= 0.0
     if stands_still.any():
-        sample = np.argmax(stands_still) + 1
-        before = t[sample - 1]
-        time = t[sample]
+        sample = int(np.argmax(stands_still)) + 1
         raise InputError(
-            f"{where}: sample {sample}: expected strictly increasing time, got {time:g}"
-            f" after {before:g} s"
+            f"{where}: sample {sample}: expected strictly increasing time, got"
+            f" {t[sample]:g} after {t[sample - 1]:g} s"
         )
+
+
+def _check_angles(t: Floats, channels: Mapping[str, Floats], where: str) -> None:
+    """Refuse arrays of a rudder, heading or yaw rate in degrees."""
+    remedy = "expected an array in radians, got one that is likely in degrees"
+    for name in channels.keys() & {"delta", "delta_command"}:
+        values = channels[name]
+        k = int(np.argmax(np.abs(values)))
+        rounding = 1.0 + 1e-9
+        if abs(values[k]) > rounding * LARGEST_MAGNITUDES[name]:
+            raise InputError(
+                f"{where}: {name}: {remedy} ({values[k]:g} in sample {k}); give"
+                f" numpy.radians({name})"
+            )
+    if {"psi", "r"} <= channels.keys():
+        gain = abs(rate_gain(t, channels["psi"], channels["r"])) * DEGREE
+        for name, factor in (("psi", gain), ("r", DEGREE**2 / max(gain, 1e-9))):
+            if 0.5 < factor < 2.0:
+                raise InputError(
+                    f"{where}: {name}: {remedy}, by psi and r together; give"
+                    f" numpy.radians({name})"
+                )
+
+
+def _frozen_array(values: npt.ArrayLike, where: str, size: int | None = None) -> Floats:
+    """Return `values` as a read-only copy of shape (n_samples,), all finite."""
+    hint = 'leave such samples out, or import the file with repair = "interpolate"'
+    array = check_finite(values, where, hint)
+    is_flat = array.ndim == 1
+    if not is_flat:
+        raise InputError(
+            f"{where}: expected an array of shape (n_samples,), got {array.shape}"
+        )
+    if size not in (None, array.size):
+        raise InputError(f"{where}: expected {size} samples as in t, got {array.size}")
+    return array

@@ -4,13 +4,10 @@ import re
 from pathlib import Path
 from typing import Any
 
-from shipgym.checks import quoted
 from shipgym.files import LARGEST_TOML, read_text
 
 #: Stands in a ship file for a value that its reader has to choose.
-_DECIDE = "decide"
-
-_SECTIONS = ("ship", "columns", "conventions", "sensors", "trials")
+_LINE = re.compile(r'\s*([\w-]+)\s*=\s*"decide"(?:\s*#\s*DECIDE:\s*(.*))?')
 
 
 def take_undecided(data: dict[str, Any], path: Path) -> tuple[str, ...]:
@@ -18,39 +15,27 @@ def take_undecided(data: dict[str, Any], path: Path) -> tuple[str, ...]:
 
     A message names the line of the file and, from its comment, the choices.
     """
-    keys: set[str] = set()
-    for section in _SECTIONS:
-        keys |= _take(data.get(section))
-    if not keys:
-        return ()
-
+    tables = [data.get(name) for name in ("ship", "columns", "conventions", "sensors")]
+    trials = data.get("trials")
+    undecided = [
+        (table, key)
+        for table in (*tables, *(trials if isinstance(trials, list) else []))
+        if isinstance(table, dict)
+        for key, value in table.items()
+        if value == "decide"
+    ]
+    for table, key in undecided:
+        del table[key]
     messages = []
-    text = read_text(path, "ship file", LARGEST_TOML)
-    pattern = re.compile(rf'\s*([\w-]+)\s*=\s*"{_DECIDE}"(?:\s*#\s*DECIDE:\s*(.*))?')
+    text = read_text(path, "ship file", LARGEST_TOML) if undecided else ""
     for number, line in enumerate(text.splitlines(), start=1):
-        match = pattern.match(line)
-        if match is None:
-            continue
-        key, choices = match.groups("a value as in docs/ship_file.md")
-        where = f"{path}: line {number}: {key}"
-        answers = choices.strip()
-        messages.append(
-            f'{where}: expected a decision, got "{_DECIDE}"; write {answers}'
-        )
-    if not messages:
-        names = quoted(sorted(keys))
-        messages = [f'{path}: expected decisions, got "{_DECIDE}" for {names}']
+        match = _LINE.match(line)
+        if match is not None:
+            key, choices = match.groups("a value as in docs/ship_file.md")
+            messages.append(
+                f"{path}: line {number}: {key}: expected a decision, got"
+                f' "decide"; write {choices.strip()}'
+            )
+    if undecided and not messages:
+        messages = [f'{path}: expected decisions, got "decide"']
     return tuple(messages)
-
-
-def _take(value: Any) -> set[str]:
-    """Take values "decide" out of a table, or each of several; their keys."""
-    keys = set()
-    if isinstance(value, list):
-        for table in value:
-            keys |= _take(table)
-    elif isinstance(value, dict):
-        keys = {key for key, one in value.items() if one == _DECIDE}
-        for key in keys:
-            del value[key]
-    return keys

@@ -52,9 +52,10 @@ def si_factor(channel: str, unit: str, where: str = "unit") -> float:
 def _no_such_unit(unit: Any, quantity: str, where: str) -> InputError:
     fitting = UNITS[quantity]
     expected = quoted(fitting)
-    hint = did_you_mean(str(unit), fitting)
+    name = str(unit)
+    hint = did_you_mean(name, fitting)
     for other, units in UNITS.items():
-        if str(unit) in units:
+        if name in units:
             hint = f" '{unit}' is a unit of {other}"
             break
     return InputError(

@@ -1,7 +1,5 @@
 """A trial is that of a ship of her size and speed, or it is said what no ship does."""
 
-import math
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,6 @@ from shipgym.trials.scale import check_scale
 
 T = np.arange(100.0)
 KNOT = 1852.0 / 3600.0
-TIP = 100.0 / (math.pi * 4.0)  # shaft speed at which 4 m have a tip of 100 m/s
 
 
 def trial(**channels):
@@ -46,13 +43,6 @@ def refusal(sailed, **ship):
         ({"u": 3.0, "v": 4.0, "r": -0.151}, {}, "at most 8.594 deg/s at up to 5 m/s"),
         ({"u": 5.0, "r": 0.149}, {}, ""),
         ({"r": 1.0}, {}, ""),  # nothing to compare it with
-        # a propeller's tip
-        ({"n": -0.99 * TIP}, {"propeller_diameter": 4.0}, ""),
-        ({"n": -1.01 * TIP}, {}, ""),
-        ({"n": -1.01 * TIP}, {"propeller_diameter": 4.0}, "at most 7.958 rps for a pr"),
-        # one and a half beams
-        ({"u": 5.0}, {"beam": 66.0}, ""),
-        ({"u": 5.0}, {"beam": 67.0}, "at least 1.5 times as long as broad, got 100 m"),
     ],
 )
 def test_what_no_ship_of_100_metres_does_is_named(channels, ship, message):

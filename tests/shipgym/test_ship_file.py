@@ -218,9 +218,9 @@ def test_trials_can_be_asked_for_by_use(folder):
         ("xg = 0.25", "", ": [[trials]] 2 origin: expected xg"),
         ("[ship]", "[ship", ": not valid TOML"),
         (
-            "[identify]",
-            "[sensors]\ngnss_antenna = { forward = 125.0 }\n[identify]",
-            ": [sensors] gnss_antenna.forward: expected at most 4.2 m",
+            'v = "v"',
+            'v = "u"',
+            ": [columns]: expected each column once, got 'u' for u and v; name the",
         ),
         ("[ship]", "[ship]\nestimated = []", "unknown key 'estimated'"),
     ],
@@ -229,16 +229,19 @@ def test_what_is_wrong_in_a_ship_file_is_named_by_field(folder, old, new, messag
     assert message in refusal(folder, old, new)
 
 
-def test_a_ship_file_without_ship_or_trials_is_refused(folder):
-    assert "expected a table [ship] with" in refusal(folder, text="")
-    assert "expected at least one [[trials]] table" in refusal(
-        folder, text="[ship]\nlength = 7.0\n"
-    )
-    assert "trials: expected tables that begin with [[trials]]" in refusal(
-        folder, text='[ship]\nlength = 7.0\n[trials]\nfile = "a.csv"\n'
-    )
-    skipped = '[ship]\nlength = 7.0\n[[trials]]\nfile = "a.csv"\nuse = "skip"\n'
-    assert 'got use = "skip" for all' in refusal(folder, text=skipped)
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "expected a table [ship] with"),
+        ("[ship]\nlength = 7.0\n", "expected tables that begin with [[trials]]"),
+        (
+            '[ship]\nlength = 7.0\n[[trials]]\nfile = "a.csv"\nuse = "skip"\n',
+            'got use = "skip" for all',
+        ),
+    ],
+)
+def test_a_ship_file_without_ship_or_trials_is_refused(folder, text, message):
+    assert message in refusal(folder, text=text)
 
 
 def test_a_missing_ship_file_a_folder_and_binary_content_are_refused(tmp_path):

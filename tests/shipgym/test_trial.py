@@ -186,13 +186,6 @@ def test_earth_fixed_velocities_are_rotated_to_the_body(tmp_path):
     np.testing.assert_allclose(trial["v"], channels["v"], atol=1e-14)
 
 
-def test_a_heading_that_jumps_at_north_becomes_continuous(tmp_path):
-    psi = 6.0 + 0.01 * T
-    for wrapped in (psi % (2 * np.pi), (psi + np.pi) % (2 * np.pi) - np.pi):
-        trial = Trial.from_csv(write(tmp_path / "run.csv", {"t": T, "psi": wrapped}))
-        np.testing.assert_allclose(np.diff(trial["psi"]), np.diff(psi), atol=1e-12)
-
-
 # --- channels that are derived
 
 
@@ -260,23 +253,6 @@ needs_data = pytest.mark.skipif(
     not DATA.is_dir(),
     reason="the measured trials lie beside the checkout and are absent here",
 )
-
-
-@needs_data
-def test_channels_derived_from_the_tank_s_positions_agree_with_its_own(tmp_path):
-    columns = {"x": "x0", "y": "y0", "psi": "psi", "delta": "delta"}
-    path = DATA / "kvlcc2_hsva" / "Z_20_05.csv"
-    derived = Trial.from_csv(path, columns, rudder_positive="port")
-    measured = Trial.from_csv(
-        path, columns | {"u": "u", "v": "v", "r": "r"}, rudder_positive="port"
-    )
-    assert derived.derived == {"u", "v", "r"}
-    for name, tolerance in {
-        "u": 1e-3,
-        "v": 1e-3,
-        "r": 4e-4,
-    }.items():  # 0.1 % of u, 1 % of v and r
-        assert np.sqrt(np.mean((derived[name] - measured[name]) ** 2)) < tolerance
 
 
 def test_velocities_derived_from_positions_are_over_ground(tmp_path):

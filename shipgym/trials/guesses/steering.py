@@ -1,13 +1,11 @@
 """Steering commands of boats without a rudder: two propellers, or a pulse width."""
 
 import re
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.trials.column_values import FULL_RUDDER_DEG
 from shipgym.trials.readers.log_table import LogTable
 
 _PORT = {"left", "port", "l", "p", "bb", "backbord", "babord"}
@@ -41,9 +39,7 @@ def steering_command(table: LogTable, free: list[str]) -> Command | None:
     numbers = {}
     for column in free:
         values = table.likely_numbers(column)
-        if values is None:
-            continue
-        known = values[np.isfinite(values)]
+        known = values[np.isfinite(values)] if values is not None else np.array([])
         if known.size and np.ptp(known) > 0.0:
             numbers[column] = known
     command = _two_propellers(numbers) or _servo(numbers)
@@ -58,35 +54,31 @@ def _two_propellers(numbers: dict[str, Floats]) -> Command | None:
     by_rest: dict[str, dict[str, str]] = {}
     for column in numbers:
         side, rest = _side(column)
-        if side:
+        if side and _PROPELLER.search(rest):
             by_rest.setdefault(rest, {})[side] = column
-    for rest, sides in by_rest.items():
-        if len(sides) == 2 and _PROPELLER.search(rest):
-            port, starboard = sides["port"], sides["starboard"]
-            both = np.concatenate([numbers[port], numbers[starboard]])
-            if _turn_alike(numbers[port], numbers[starboard]):
-                continue
+    for sides in by_rest.values():
+        if len(sides) < 2:
+            continue
+        first, second = sides["port"], sides["starboard"]
+        port, starboard = numbers[first], numbers[second]
+        if port.size == starboard.size and _turn_apart(port, starboard):
+            both = np.concatenate([port, starboard])
             full = 2.0 * _SPAN
             if not _is_pulse_width(both):
-                full = float(f"{2.0 * float(np.mean(np.abs(both))):.2g}") or 1.0
-            return _difference(port, starboard, f"of which {full:g}", full)
+                mean = float(np.mean(np.abs(both)))
+                full = float(f"{2.0 * mean:.2g}") or 1.0
+            reason = (
+                f"steering command: '{first}' minus '{second}', of which {full:g}"
+                " counts as 35 deg of a nominal rudder"
+            )
+            return Command(first, "deg", reason, (("minus", second), ("full", full)))
     return None
 
 
-def _difference(first: str, second: str, words: str, full: float) -> Command:
-    reason = (
-        f"steering command: '{first}' minus '{second}', {words} counts as"
-        f" {FULL_RUDDER_DEG:g} deg of a nominal rudder"
-    )
-    return Command(first, "deg", reason, (("minus", second), ("full", full)))
-
-
-def _turn_alike(port: Floats, starboard: Floats) -> bool:
-    """Return whether two propellers never differ by more than a hundredth."""
-    if port.size != starboard.size:
-        return True
-    largest = np.abs(np.concatenate([port, starboard])).max()
-    return bool(np.ptp(port - starboard) < 0.01 * largest)
+def _turn_apart(port: Floats, starboard: Floats) -> bool:
+    """Return whether two propellers differ by more than a hundredth at times."""
+    largest = max(np.abs(port).max(), np.abs(starboard).max())
+    return bool(np.ptp(port - starboard) > 0.01 * largest)
 
 
 def _side(column: str) -> tuple[str, str]:
@@ -100,51 +92,24 @@ def _side(column: str) -> tuple[str, str]:
     return "", ""
 
 
-def other_rudder(table: LogTable, column: str, free: list[str]) -> str | None:
-    """Column of a second rudder, that of the other side or number; None without one.
-
-    One that stands still is none.
-    """
-    side, rest = _side(column)
-    for other in free:
-        other_side, other_rest = _side(other)
-        are_sides = column.replace("1", "2", 1) == other != column
-        if side and other_side:
-            are_sides = side != other_side and rest == other_rest
-        if not are_sides:
-            continue
-        both = [table.likely_numbers(name, sided=True) for name in (column, other)]
-        moved = [np.ptp(one[np.isfinite(one)]) for one in both if one is not None]
-        if len(moved) == 2 and min(moved) > 0.1 * max(moved):
-            return other
-    return None
-
-
 def _servo(numbers: dict[str, Floats]) -> Command | None:
     """The first pulse width that a servo of radio control gets.
 
-    ArduPilot's ``SteerOut`` is a command up to 4500. Of two motors of which one goes up
-    where the other goes down it is the difference.
+    ArduPilot's ``SteerOut`` is a command up to 4500.
     """
-    servos = {}
-    for column, values in numbers.items():
+    for column in numbers:
         if re.fullmatch(r"(.*\.)?SteerOut", column):
             reason = "steering command of ArduPilot, of which 4500 is the full one"
             return Command(column, "deg", reason, (("full", 4500.0),))
+    for column, values in numbers.items():
         if _SERVO.fullmatch(column) and _is_pulse_width(values):
-            servos[column] = values
-    for (left, a), (right, b) in combinations(servos.items(), 2):
-        if a.size == b.size and np.corrcoef(a, b)[0, 1] < -0.8:
-            words = f"two motors that mirror each other, of which {2.0 * _SPAN:g} us"
-            return _difference(left, right, words, 2.0 * _SPAN)
-    if not servos:
-        return None
-    reason = (
-        f"steering command: a pulse width in us, neutral at {_NEUTRAL:g}, of which"
-        f" {_SPAN:g} counts as {FULL_RUDDER_DEG:g} deg of a nominal rudder"
-    )
-    extra = (("neutral", _NEUTRAL), ("full", _SPAN))
-    return Command(next(iter(servos)), "deg", reason, extra)
+            reason = (
+                f"steering command: a pulse width in us, neutral at {_NEUTRAL:g}, of"
+                f" which {_SPAN:g} counts as 35 deg of a nominal rudder"
+            )
+            extra = (("neutral", _NEUTRAL), ("full", _SPAN))
+            return Command(column, "deg", reason, extra)
+    return None
 
 
 def _is_pulse_width(values: Floats) -> bool:

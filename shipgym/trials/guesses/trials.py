@@ -1,7 +1,8 @@
 """Logs read with guessed columns and conventions, corrected by what checks propose."""
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,11 +11,10 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import quoted, shown
 from shipgym.errors import InputError
-from shipgym.trials.conventions import Conventions, Installation
-from shipgym.trials.guesses.attitudes import frame_by_names
-from shipgym.trials.guesses.columns import ColumnGuess, guess_columns
+from shipgym.trials.conventions import Conventions
+from shipgym.trials.guesses.columns import RUDDERS, ColumnGuess, guess_columns
 from shipgym.trials.guesses.speeds import settle_speeds
-from shipgym.trials.guesses.units import UNKNOWN
+from shipgym.trials.guesses.units import UNKNOWN, unit_by_size
 from shipgym.trials.readers.cell_texts import number_with_side
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable
@@ -23,8 +23,14 @@ from shipgym.trials.trial import Trial, trial_of
 from shipgym.trials.trial_import import import_tables
 from shipgym.trials.units import QUANTITIES, si_unit
 
-#: What a message names that is cured by a line of the ship file.
-_CURABLE = ("[columns]", "[conventions]", "[sensors]", "declare ", "column = ")
+#: Channels of which a log without their unit has to be asked about.
+_NEEDED = ("t", "psi", "r", *RUDDERS, "sog", "stw", "u")
+#: Names of messages of ROS, whose world is east, north, up, and whose bodies are
+#: forward, port, up (REP 103).
+_ROS = re.compile(
+    r"(^|[._/])(orientation|pose|twist|angular_?velocity)[._/](?!.*(head|hdg|compass))",
+    re.IGNORECASE,
+)
 
 
 class RudderSide(NamedTuple):
@@ -53,32 +59,54 @@ class ConventionGuess(NamedTuple):
 class Decision(NamedTuple):
     """A line of the ship file that its reader has to complete, and the choices."""
 
-    section: str  # "columns", "conventions", "sensors" or "trials"
+    section: str  # "columns" or "trials"
     key: str
     choices: str
 
 
-@dataclass(frozen=True)
+@dataclass
 class TrialGuess:
-    """A log, and the columns and conventions with which it could be read."""
+    """A log, and the columns and conventions with which it could be read.
 
-    paths: tuple[Path, ...]  # several that were written at the same time are one log
-    columns: list[ColumnGuess]
-    conventions: list[ConventionGuess]  # those that are not the usual ones
-    trial: Trial | None  # none where a decision is needed first
-    unused: list[str]  # columns of which no channel was made
-    side: RudderSide | None  # to which a positive rudder steers; none without one
+    Attributes
+    ----------
+    tables : sequence of LogTable
+        The files; several that were written at the same time are one log.
+    columns : list of ColumnGuess
+        Empty where the reader knows the channels.
+    conventions : list of ConventionGuess
+        Those that are not the usual ones.
+    decisions : list of Decision
+        What is to be decided first.
+    trial : Trial or None
+        None where a decision is needed first.
+    side : RudderSide or None
+        To which a positive rudder steers; None without one.
+    """
+
+    tables: Sequence[LogTable]
+    columns: list[ColumnGuess] = field(default_factory=list)
+    conventions: list[ConventionGuess] = field(default_factory=list)
     decisions: list[Decision] = field(default_factory=list)
+    trial: Trial | None = None
+    side: RudderSide | None = None
 
     @property
-    def path(self) -> Path:
-        """The file, or the first one."""
-        return self.paths[0]
+    def paths(self) -> list[Path]:
+        """The files."""
+        return [table.path for table in self.tables]
 
     @property
-    def column_names(self) -> list[str]:
-        """Names and units of the columns that are used."""
-        return [one.declaration for one in self.columns]
+    def unused(self) -> list[str]:
+        """Columns of which no channel was made."""
+        used: set[Any] = {*QUANTITIES} if not self.columns else set()
+        for guess in self.columns:
+            used.add(guess.column)
+            for _, value in guess.extra:
+                names = value if isinstance(value, tuple) else [value]
+                used.update(names)
+        header = [name for table in self.tables for name in table.header]
+        return [name for name in header if name not in used]
 
     @property
     def unused_names(self) -> str:
@@ -90,10 +118,8 @@ class TrialGuess:
         """What each channel, and the rudder's sign, was read as, and why."""
         reading = {}
         for one in self.columns:
-            unit = one.unit
-            for key, value in one.extra:
-                unit += f", {key} {value}"
-            where = f"column '{one.column}' in {unit}"
+            extra = "".join(f", {key} {value}" for key, value in one.extra)
+            where = f"column '{one.column}' in {one.unit}{extra}"
             reading[one.channel] = f"{where}, unit {one.reason}"
         for convention in self.conventions:
             reading[convention.name] = f"{convention.value}: {convention.reason}"
@@ -104,115 +130,147 @@ class TrialGuess:
             reading["columns not used"] = self.unused_names
         return reading
 
+    def take(self, name: str, value: str, reason: str) -> None:
+        """Read the log with a unit or a convention from now on."""
+        for k, one in enumerate(self.columns):
+            if one.channel == name:
+                because = f"by the check that refused {one.unit} ({one.reason})"
+                self.columns[k] = one._replace(unit=value, reason=because)
+                return
+        self.conventions.append(ConventionGuess(name, value, reason))
+
+    def read(self) -> Trial:
+        """Read the log with the guesses so far."""
+        columns = {one.channel: one.as_column for one in self.columns}
+        words: dict[str, Any] = {one.name: one.value for one in self.conventions}
+        conventions = Conventions(**words, where=f"{self.paths[0]}:")
+        log = import_tables(self.tables, columns or None, conventions)
+        return trial_of(log, " + ".join(path.name for path in self.paths))
+
 
 def guess_trial(path: str | Path, *others: str | Path) -> TrialGuess:
     """Read a log with guesses; where a check proposes another setting, try that.
 
-    A unit given in a column's name is kept unless the positions contradict it. What a
-    line of a ship file can cure is a decision. With `others`, files that were written
-    at the same time are read as one log, each channel from the file with most rows of
-    it. Raises InputError, as the readers do, for other logs that cannot be read.
+    A unit given in a column's name is kept unless the positions contradict it. Where a
+    log cannot be read so, that is a decision. With `others`, files that were written at
+    the same time are read as one log, each channel from the file with most rows of it.
+    Raises InputError for a file that is no log.
     """
-    tables = [read_log(one) for one in (path, *others)]
-    guesses = _Guesses(tables)
-    if not all(_knows_channels(table) for table in tables):
-        guesses.columns, guesses.decisions = _guess_tables(tables)
-    names = {channel: one.column for channel, one in guesses.columns.items()}
-    east = frame_by_names(names)
-    if east is not None:
-        guesses.take_convention("frame", "enu", east)
-    trial = _trial_by_proposals(guesses)
-    side = None
-    if trial is None:
-        guesses.conventions = {}
-    else:
-        is_turned = "rudder_positive" in guesses.conventions
-        side = _rudder_side(guesses, trial, is_turned=is_turned)
-        if side is not None and side.side == "port" and not is_turned:
-            guesses.take_convention("rudder_positive", "port", side.reason)
-            trial = _read(guesses)
-        guesses.conventions.pop("rudder_positive", None)
-    unused = []
-    for table in tables:
-        unused += _unused(table, guesses.columns)
-    return TrialGuess(
-        paths=tuple(table.path for table in tables),
-        columns=list(guesses.columns.values()),
-        conventions=list(guesses.conventions.values()),
-        trial=trial,
-        unused=unused,
-        side=side,
-        decisions=guesses.decisions,
-    )
+    guess = TrialGuess([read_log(one) for one in (path, *others)])
+    # some readers name the columns by their channels, with units
+    if not all(
+        table.units and table.cells.keys() <= QUANTITIES.keys()
+        for table in guess.tables
+    ):
+        _guess_tables(guess)
+    _take_frame(guess)
+    guess.trial = _trial_by_proposals(guess)
+    if guess.trial is not None and guess.trial.channels.keys().isdisjoint(RUDDERS):
+        guess.decisions += _rudder_by_behaviour(guess)
+    if guess.trial is None:
+        guess.conventions = []
+        return guess
+    is_turned = any(one.name == "rudder_positive" for one in guess.conventions)
+    guess.side = _rudder_side(guess, guess.trial, is_turned=is_turned)
+    if guess.side is not None and guess.side.side == "port" and not is_turned:
+        guess.take("rudder_positive", "port", guess.side.reason)
+        guess.trial = guess.read()
+    guess.conventions = [
+        one for one in guess.conventions if one.name != "rudder_positive"
+    ]
+    return guess
 
 
-@dataclass
-class _Guesses:
-    """Tables of a log, and the guesses so far with which they are read."""
-
-    tables: Sequence[LogTable]
-    columns: dict[str, ColumnGuess] = field(default_factory=dict)
-    conventions: dict[str, ConventionGuess] = field(default_factory=dict)
-    decisions: list[Decision] = field(default_factory=list)
-
-    def take_convention(self, name: str, value: str, reason: str) -> None:
-        """Read the log with a convention from now on."""
-        self.conventions[name] = ConventionGuess(name, value, reason)
-
-    def take_proposal(self, name: str, value: str) -> None:
-        """Read the log with a unit or a convention that a check proposed."""
-        column = self.columns.get(name)
-        if column is not None:
-            self.columns[name] = _with_unit(column, value)
-        else:
-            self.take_convention(name, value, "without it the log is refused")
+def _take_frame(guess: TrialGuess) -> None:
+    """Count angles from east where the names of their columns are those of ROS."""
+    for one in guess.columns:
+        if one.channel in ("psi", "r") and _ROS.search(one.column):
+            reason = (
+                f"'{one.column}' is named as messages of ROS, whose angles count from"
+                " east and to port; check it with a turn whose side is known"
+            )
+            guess.take("frame", "enu", reason)
+            return
 
 
-def _trial_by_proposals(guesses: _Guesses) -> Trial | None:
+def _trial_by_proposals(guess: TrialGuess) -> Trial | None:
     """Read a log, with what its checks propose; None where there is to decide first."""
     tried: set[tuple[str, str]] = set()
-    while all(one.section == "sensors" for one in guesses.decisions):
+    while not guess.decisions:
         try:
-            return _read(guesses)
+            return guess.read()
         except InputError as error:
-            proposal = _next_proposal(error, guesses.columns, tried)
-            if proposal is None:
-                decision = _decision(error, guesses.decisions)
-                guesses.decisions.append(decision)
-            else:
+            named = {one.channel for one in guess.columns if one.is_named}
+            found = {one.channel for one in guess.columns}
+            proposal = next(
+                (
+                    one
+                    for one in error.instead
+                    if one not in tried
+                    and (one[0] in found - named or one[0] not in QUANTITIES)
+                ),
+                None,
+            )
+            if proposal is not None:
                 tried.add(proposal)
-                guesses.take_proposal(*proposal)
+                guess.take(*proposal, "without it the log is refused")
+            else:
+                choices = f'"fit" once this is settled, or "skip": {error}'
+                guess.decisions.append(Decision("trials", "use", choices))
     return None
 
 
-def _knows_channels(table: LogTable) -> bool:
-    """Return whether a reader named the columns by their channels, with units."""
-    return bool(table.units) and table.cells.keys() <= QUANTITIES.keys()
-
-
-def _guess_tables(
-    tables: Sequence[LogTable],
-) -> tuple[dict[str, ColumnGuess], list[Decision]]:
-    """Columns of all tables by channel, and what is left to decide."""
+def _guess_tables(guess: TrialGuess) -> None:
+    """Add columns of all tables by channel, and what is left to decide."""
     columns: dict[str, ColumnGuess] = {}
-    decisions: list[Decision] = []
-    by_density = sorted(tables, key=lambda table: len(table.rows), reverse=True)
-    for table in by_density:
-        found = {guess.channel: guess for guess in guess_columns(table)}
-        decisions += _unknown_units(found)
-        settled = settle_speeds(table, found)
-        for channel, guess in settled.items():
+    tables = sorted(guess.tables, key=lambda table: len(table.rows), reverse=True)
+    for table in tables:
+        found = {one.channel: one for one in guess_columns(table)}
+        guess.decisions += _unknown_units(found)
+        for channel, one in settle_speeds(table, found).items():
             if len(tables) > 1 and channel != "t":
-                reason = f"{guess.reason}; from {table.path.name}"
-                guess = guess._replace(reason=reason)
-            columns.setdefault(channel, guess)
-    asked = {one.key for one in decisions}
-    decisions += _missing_columns(tables, columns, asked)
-    return columns, decisions
+                one = one._replace(reason=f"{one.reason}; from {table.path.name}")
+            columns.setdefault(channel, one)
+    guess.columns = list(columns.values())
+    _ask_for_missing(guess)
+
+
+def _ask_for_missing(guess: TrialGuess) -> None:
+    """Add decisions on columns without which a log shows no motion."""
+    known = {one.channel for one in guess.columns}
+    known |= {one.key for one in guess.decisions}
+    wanted = {"t": "time"}
+    if known.isdisjoint(("psi", "r", "x", "lat", "u")):
+        wanted |= {"psi": "heading", "delta": "rudder angle"}
+    for channel, words in wanted.items():
+        if channel not in known:
+            choices = _choices(guess, channel, words)
+            guess.decisions.append(Decision("columns", channel, choices))
+
+
+def _rudder_by_behaviour(guess: TrialGuess) -> list[Decision]:
+    """A decision on the column that moves before the heading turns."""
+    for name in guess.unused:
+        values = (
+            guess.tables[0].likely_numbers(name) if len(guess.tables) == 1 else None
+        )
+        if values is None or not _behaves("delta", values):
+            continue
+        unit = unit_by_size(values, "delta").unit
+        reason = "as it moves before the heading turns"
+        column = ColumnGuess("delta", name, unit, reason)
+        try:
+            trial = replace(guess, columns=[*guess.columns, column]).read()
+        except InputError:
+            continue
+        if "psi" in trial and rudder_sign(trial.t, trial["psi"], trial["delta"]).side:
+            choices = f"likely the rudder, {column.reason}: {column.declaration}"
+            return [Decision("columns", "delta", choices)]
+    return []
 
 
 def _rudder_side(
-    guesses: _Guesses, trial: Trial, *, is_turned: bool
+    guess: TrialGuess, trial: Trial, *, is_turned: bool
 ) -> RudderSide | None:
     """Side of the rudder in a log that was read, `is_turned` with positive to port.
 
@@ -221,20 +279,17 @@ def _rudder_side(
     rudder = trial.channels.get("delta", trial.channels.get("delta_command"))
     if "psi" not in trial or rudder is None:
         return None
-    columns = guesses.columns
-    column = columns.get("delta") or columns.get("delta_command")
-    for table in guesses.tables:
-        if column is None or column.column not in table.cells:
-            continue
-        first = table.first_text(column.column)
-        if table.decimal_comma:
-            first = first.replace(",", ".")
-        if number_with_side(first) is not None:
-            return RudderSide("starboard", "the letters S and P of its values")
+    names = [one.column for one in guess.columns if one.channel in RUDDERS]
+    for table in guess.tables:
+        for name in names:
+            if (
+                name in table.cells
+                and number_with_side(table.first_text(name)) is not None
+            ):
+                return RudderSide("starboard", "the letters S and P of its values")
     found = rudder_sign(trial.t, trial["psi"], rudder)
     if found.side is None:
-        hint = found.side_by_hint(is_turned=is_turned)
-        return RudderSide(None, f"the log does not tell{hint}")
+        return RudderSide(None, "the log does not tell")
     if not is_turned:
         return RudderSide(found.side, found.reason)
     if found.side == "port":
@@ -242,80 +297,39 @@ def _rudder_side(
     return RudderSide("port", found.reason)
 
 
-def _unused(table: LogTable, columns: Mapping[str, ColumnGuess]) -> list[str]:
-    used = set()
-    for guess in columns.values():
-        used.add(guess.column)
-        for _, value in guess.extra:
-            names = value if isinstance(value, tuple) else [str(value)]
-            used.update(names)
-    known = used or QUANTITIES.keys()
-    return [name for name in table.header if name not in known]
-
-
 def _unknown_units(columns: dict[str, ColumnGuess]) -> list[Decision]:
     """Take out columns whose unit is not known; decisions on those that matter."""
-    matter = ("t", "psi", "r", "delta", "delta_command", "sog", "stw", "u")
     decisions = []
-    for channel, guess in list(columns.items()):
-        if guess.unit != UNKNOWN:
-            continue
-        del columns[channel]
-        if channel not in matter:
-            continue
-        unit = si_unit(channel)
-        line = f'{{ column = {guess.quoted}, unit = "{unit}" }} where that is its unit'
-        if channel in ("delta", "delta_command"):
-            line = (
-                f"{{ column = {guess.quoted}, full = 100 }} where 100 of it are 35 deg"
-                " of rudder"
-            )
-        choices = f"column {guess.quoted}, whose unit {guess.reason}: {line}"
-        decisions.append(Decision("columns", channel, choices))
+    unknown = [one for one in columns.values() if one.unit == UNKNOWN]
+    for guess in unknown:
+        del columns[guess.channel]
+        usual = si_unit(guess.channel)
+        unit = f'unit = "{usual}" }} where that is its unit'
+        if guess.channel in RUDDERS:
+            unit = "full = 100 } where 100 of it are 35 deg of rudder"
+        choices = (
+            f"column {guess.quoted}, whose unit {guess.reason}:"
+            f" {{ column = {guess.quoted}, {unit}"
+        )
+        if guess.channel in _NEEDED:
+            decisions.append(Decision("columns", guess.channel, choices))
     return decisions
 
 
-def _missing_columns(
-    tables: Sequence[LogTable],
-    columns: Mapping[str, ColumnGuess],
-    asked: Collection[str],
-) -> list[Decision]:
-    """Decisions on columns without which a log shows no motion."""
-    wanted = {"t": "time"}
-    of_motion = {"psi", "r", "x", "lat", "u"}
-    if not of_motion & {*columns, *asked}:
-        wanted["psi"] = "heading"
-        if "delta" not in columns:
-            wanted["delta"] = "rudder angle"
-    used = {guess.column for guess in columns.values()}
-    missing = []
-    for channel, words in wanted.items():
-        if channel not in columns and channel not in asked:
-            choices = _choices(tables, used, channel, words)
-            missing.append(Decision("columns", channel, choices))
-    return missing
-
-
-def _choices(
-    tables: Sequence[LogTable], used: set[str], channel: str, words: str
-) -> str:
+def _choices(guess: TrialGuess, channel: str, words: str) -> str:
     """Free columns that behave as a channel does, or all free ones where none does."""
-    free = []
     alike = []
-    for table in tables:
-        for name in table.header:
-            if name in used:
-                continue
-            free.append(name)
-            values = table.likely_numbers(name, sided=True)
+    for table in guess.tables:
+        for name in {*table.header}.intersection(guess.unused):
+            values = table.likely_numbers(name)
             if values is not None and _behaves(channel, values):
                 alike.append(name)
-    first = next(iter(alike or free), words)
+    names = [name for name in guess.unused if name in alike] or guess.unused
+    first = next(iter(names), words)
     unit = "s" if channel == "t" else "deg"
     column = f'{{ column = "{first}", unit = "{unit}" }}'
-    return (
-        f"the column of the {words}, one of {quoted(alike or free)[:1000]}, as {column}"
-    )
+    all_of_them = quoted(names)[:1000]
+    return f"the column of the {words}, one of {all_of_them}, as {column}"
 
 
 def _behaves(channel: str, values: Floats) -> bool:
@@ -327,59 +341,6 @@ def _behaves(channel: str, values: Floats) -> bool:
     if channel == "t":
         return bool(np.mean(steps > 0.0) > 0.99)
     largest = np.abs(known).max()
-    counts = bool(np.all(steps > 0.0))  # as a number of rows does
     if channel == "psi":
-        return not counts and largest <= 720.0
-    swings = known.min() < 0.0 < known.max()
-    return bool(swings and largest <= 90.0)
-
-
-def _decision(error: InputError, decisions: list[Decision]) -> Decision:
-    """The decision that a refusal leaves to the user; the error where it is none."""
-    message = str(error)
-    of_clock = "clock_offsets" in message
-    is_curable = any(cure in message for cure in _CURABLE)
-    if of_clock and not decisions:
-        choices = f'"correct" or "keep": {message}'
-        return Decision("sensors", "clock_offsets", choices)
-    if of_clock or not is_curable:
-        raise error
-    choices = f'"fit" once this is settled, or "skip": {message}'
-    return Decision("trials", "use", choices)
-
-
-def _read(guesses: _Guesses) -> Trial:
-    """Read a log with the guesses so far."""
-    tables = guesses.tables
-    columns = {}
-    for channel, guess in guesses.columns.items():
-        columns[channel] = guess.as_column
-    words: dict[str, Any] = {"where": f"{tables[0].path}:"}
-    for one in guesses.conventions.values():
-        words[one.name] = one.value
-    if any(one.key == "clock_offsets" for one in guesses.decisions):
-        words["installation"] = Installation(clock_offsets="keep")
-    conventions = Conventions(**words)
-    log = import_tables(tables, columns or None, conventions)
-    files = [table.path.name for table in tables]
-    return trial_of(log, " + ".join(files))
-
-
-def _next_proposal(
-    error: InputError, columns: Mapping[str, ColumnGuess], tried: set[tuple[str, str]]
-) -> tuple[str, str] | None:
-    """First proposal of a refusal that was not tried and is no unit given by a name."""
-    for proposal in error.instead:
-        name, _ = proposal
-        may_be_tried = name not in QUANTITIES  # a convention
-        if name in columns:
-            may_be_tried = not columns[name].is_named
-        if may_be_tried and proposal not in tried:
-            return proposal
-    return None
-
-
-def _with_unit(guess: ColumnGuess, unit: str) -> ColumnGuess:
-    """A column with the unit that a check proposed."""
-    reason = f"by the check that refused {guess.unit} ({guess.reason})"
-    return guess._replace(unit=unit, reason=reason)
+        return largest <= 720.0 and not np.all(steps > 0.0)  # as a number of rows does
+    return bool(known.min() < 0.0 < known.max() and largest <= 40.0)

@@ -1,4 +1,4 @@
-"""Values beyond what any ship does: ranges, headings, positions, clocks set forward."""
+"""Values beyond what any ship does: ranges, headings, positions."""
 
 import math
 from collections.abc import Mapping
@@ -8,7 +8,6 @@ import numpy as np
 from shipgym.arrays import Flags, Floats
 from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
-from shipgym.trials.plausibility.agreement import likelier_time_units
 from shipgym.trials.resampling import usual_step
 from shipgym.trials.units import (
     DEGREE,
@@ -27,37 +26,31 @@ def check_ranges(channels: Mapping[str, Floats], locator: Locator) -> None:
 
     The channels are in SI units, of shape (n_samples,), nan where there is none.
     """
-    rounding = 1.0 + 1e-9
-    for channel, largest in LARGEST_MAGNITUDES.items():
-        if channel not in channels:
+    for channel, values in channels.items():
+        limit = LARGEST_MAGNITUDES[channel]
+        too_large = np.abs(values) > (1.0 + 1e-9) * limit
+        if not too_large.any():
             continue
-        sizes = np.abs(channels[channel])
-        too_large = sizes > rounding * largest
-        if too_large.any():
-            first = int(np.argmax(too_large))
-            value = float(channels[channel][first])
-            raise _out_of_range(channel, value, first, np.nanmax(sizes), locator)
+        first = int(np.argmax(too_large))
+        declared = locator.columns[channel].unit
+        own = si_factor(channel, declared)
+        largest = np.nanmax(np.abs(values)) / own
+        fitting = _fitting_units(channel, limit / largest)
+        remedy = "check the column and its unit, or correct the value"
+        if fitting:
+            remedy = f"likely a wrong unit: declare {locator.declaration(*fitting[0])}"
+        raise InputError(
+            f"{locator.place(first, channel)}: expected {channel} of at most"
+            f" {_spelled(limit / own, declared)}, got"
+            f" {_spelled(float(values[first]) / own, declared)}; {remedy}",
+            fitting,
+        )
 
 
-def _out_of_range(
-    channel: str, value: float, row: int, size: float, locator: Locator
-) -> InputError:
-    declared = locator.columns[channel].unit
-    own = si_factor(channel, declared)
-    limit = LARGEST_MAGNITUDES[channel]
-    fitting = []
-    for unit, factor in UNITS[QUANTITIES[channel]].items():
-        if factor / own <= limit / size:
-            fitting.append((channel, unit))
-    remedy = "check the column and its unit, or correct the value"
-    if fitting:
-        remedy = f"likely a wrong unit: declare {locator.declaration(*fitting[0])}"
-    return InputError(
-        f"{locator.place(row, channel)}: expected {channel} of at most"
-        f" {_spelled(limit / own, declared)}, got {_spelled(value / own, declared)};"
-        f" {remedy}",
-        fitting,
-    )
+def _fitting_units(channel: str, largest_factor: float) -> list[tuple[str, str]]:
+    """Units of a channel whose factor to SI is at most that."""
+    factors = UNITS[QUANTITIES[channel]]
+    return [(channel, unit) for unit in factors if factors[unit] <= largest_factor]
 
 
 def _spelled(number: float, unit: str) -> str:
@@ -65,10 +58,9 @@ def _spelled(number: float, unit: str) -> str:
     text = f"{number:g} {unit}"
     if unit not in ("rad", "rad/s"):
         return text
-    return f"{text} ({math.degrees(number):g} {unit.replace('rad', 'deg')})"
-
-
-# ---- headings
+    degrees = math.degrees(number)
+    in_degrees = unit.replace("rad", "deg")
+    return f"{text} ({degrees:g} {in_degrees})"
 
 
 def without_spikes(psi: Floats) -> tuple[Floats, int]:
@@ -84,9 +76,8 @@ def without_spikes(psi: Floats) -> tuple[Floats, int]:
     """
     if psi.size < 3 or np.isinf(psi).any():
         return psi, 0
-    steps = _wrapped(np.diff(psi))
+    jumps = np.abs(_wrapped(np.diff(psi))) > _LARGEST_JUMP
     across = _wrapped(psi[2:] - psi[:-2])
-    jumps = np.abs(steps) > _LARGEST_JUMP
     outliers = np.flatnonzero(jumps[:-1] & jumps[1:] & (np.abs(across) < _LARGEST_JUMP))
     if not 0 < outliers.size <= 0.01 * psi.size:
         return psi, 0
@@ -109,53 +100,32 @@ def check_heading(t: Floats, psi: Floats, logged: Floats, locator: Locator) -> N
     """
     fastest_turn = 80.0 * DEGREE  # per second, of a small model
     fastest_jump = 60.0 * DEGREE
-    several_turns = np.abs(np.diff(logged)) > _TURN_AND_JUMP
     steps = np.abs(np.diff(psi))
     jumps = (steps > fastest_jump * np.diff(t)) & (steps > _LARGEST_JUMP)
-    is_fast = np.zeros(steps.size, dtype=bool)
+    wrong = np.abs(np.diff(logged)) > _TURN_AND_JUMP
     rows = math.ceil(0.1 / usual_step(t))  # beyond the noise of quick rows
     turned = np.abs(psi[rows:] - psi[:-rows])
-    is_fast[: turned.size] = turned > fastest_turn * (t[rows:] - t[:-rows])
-    if several_turns.any():
-        wrong = several_turns
-    elif is_fast.mean() > 0.05:
+    passed = t[rows:] - t[:-rows]
+    is_fast = turned > fastest_turn * passed
+    if not wrong.any() and is_fast.size and is_fast.mean() > 0.05:
         wrong = is_fast
+    remedy = 'empty the wrong cells and import with repair = "interpolate", or correct'
+    proposals = []
+    if wrong.any():
+        unit = "deg" if locator.columns["psi"].unit == "rad" else "rad"
+        proposals = [("psi", unit)]
+        remedy = f"likely a wrong unit: declare {locator.declaration('psi', unit)}"
     elif jumps.any():
-        remedy = 'empty the wrong cells and import with repair = "interpolate", or'
-        raise _too_fast_turn(t, logged, jumps, locator, f"{remedy} correct them")
+        wrong = jumps
     else:
         return
-
-    # the unit of time if the heading stays within a turn, else that of the heading
-    time_units = list(likelier_time_units(t, locator))
-    other = "deg" if locator.columns["psi"].unit == "rad" else "rad"
-    proposal = ("psi", other)
-    if time_units and np.ptp(logged) < _TURN_AND_JUMP:
-        proposal = ("t", time_units[0])
-    remedy = f"likely a wrong unit: declare {locator.declaration(*proposal)}"
-    raise _too_fast_turn(t, logged, wrong, locator, remedy, proposal)
-
-
-def _too_fast_turn(
-    t: Floats,
-    logged: Floats,
-    wrong: Flags,
-    locator: Locator,
-    remedy: str,
-    *proposals: tuple[str, str],
-) -> InputError:
-    """Error at the first of the wrong steps, in the unit of the file."""
     k = int(np.argmax(wrong))
-    before = locator.in_file("psi", logged[k])
-    after = locator.in_file("psi", logged[k + 1])
-    return InputError(
+    before, after = (locator.in_file("psi", one) for one in logged[k : k + 2])
+    raise InputError(
         f"{locator.place(k + 1, 'psi')}: expected a heading that turns by at most 80"
         f" deg/s, got {before} and then {after} within {t[k + 1] - t[k]:g} s; {remedy}",
         proposals,
     )
-
-
-# ---- positions
 
 
 def find_outliers(t: Floats, x: Floats, y: Floats, locator: Locator) -> Flags:
@@ -181,45 +151,5 @@ def find_outliers(t: Floats, x: Floats, y: Floats, locator: Locator) -> Flags:
             " lat and lon"
         )
     # the first and the last one have a neighbour on one side only
-    to_it = np.insert(too_fast, 0, True)
-    from_it = np.append(too_fast, True)
-    is_outlier: Flags = to_it & from_it
+    is_outlier: Flags = np.insert(too_fast, 0, True) & np.append(too_fast, True)
     return is_outlier
-
-
-def without_clock_jumps(t: Floats, x: Floats, y: Floats) -> tuple[Floats, list[str]]:
-    """Times without the seconds by which the clock was set forward, and notes of them.
-
-    Over such a gap a ship with way on has moved no farther than between any two rows;
-    in a gap of the recording she sails on. `x` and `y` are positions in m.
-    """
-    if t.size < 20 or not np.isfinite(t + x + y).all():
-        return t, []
-    steps = np.diff(t)
-    moved = np.hypot(np.diff(x), np.diff(y))
-    usual = float(np.median(steps))
-    shifts = np.zeros_like(t)
-    notes = []
-    for row in np.flatnonzero(steps > max(5.0 * usual, 5.0)).tolist():
-        if not _hardly_moved(steps, moved, row):
-            continue
-        surplus = float(steps[row]) - usual
-        shifts[row + 1 :] += surplus
-        notes.append(
-            f"the clock was set forward by {surplus:.3g} s after {t[row]:.6g} s, as the"
-            f" ship moved by {moved[row]:.2g} m meanwhile; that time is taken out"
-        )
-    return t - shifts, notes
-
-
-def _hardly_moved(steps: Floats, moved: Floats, row: int) -> bool:
-    """Return whether a ship with way on moved over a step as in any around it."""
-    around = np.arange(max(row - 10, 0), min(row + 11, steps.size))
-    around = around[around != row]
-    here = moved[row]
-    with np.errstate(all="ignore"):
-        speeds = moved[around] / steps[around]
-        speed = float(np.median(speeds))
-        is_far_too_short = here < 0.2 * speed * steps[row]
-    as_usual = here < 2.0 * moved[around].max()
-    return bool(speed >= 1.0 and as_usual and is_far_too_short)

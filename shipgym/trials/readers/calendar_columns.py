@@ -3,6 +3,8 @@
 import re
 from dataclasses import replace
 
+import numpy as np
+
 from shipgym.trials.readers.log_table import LogTable
 
 #: Names in lower case, with nothing behind the first blank, bracket or underscore.
@@ -14,8 +16,6 @@ _NAMES = {
     "minute": "minute minutes min mi minuto minutt minuut minut 分 минута",
     "second": "second seconds sec secs ss sekunde seconde segundo sekund 秒 секунда",
 }
-_DATE = ("year", "month", "day")
-_CLOCK = ("hour", "minute", "second")
 
 
 def with_one_time(table: LogTable) -> LogTable:
@@ -24,42 +24,29 @@ def with_one_time(table: LogTable) -> LogTable:
     The date may be missing. A table without columns of hour, minute and second, or with
     other values than numbers in them, is returned as it is.
     """
-    parts = _parts(table)
-    if not set(_CLOCK) <= parts.keys():
-        return table
-    has_date = set(_DATE) <= parts.keys()
-    wanted = (*_DATE, *_CLOCK) if has_date else _CLOCK
-    texts = [table.texts(parts[part]) for part in wanted]
-    try:
-        times = [_written(cells) for cells in zip(*texts, strict=True)]
-    except ValueError:
-        return table
-
-    names = [parts[part] for part in wanted]
-    joined = " ".join(names)
-    cells = {f"Time ({joined})": times}
-    for name, column in table.cells.items():
-        if name not in names:
-            cells[name] = column
-    return replace(table, cells=cells)
-
-
-def _parts(table: LogTable) -> dict[str, str]:
-    """Columns by the part of a time that they are."""
     parts: dict[str, str] = {}
     for column in table.header:
         word = re.split(r"[ _\[(.]", column.strip().lower())[0]
-        for part, names in _NAMES.items():
-            if word in names.split() and part not in parts:
-                parts[part] = column
-    return parts
+        for part, words in _NAMES.items():
+            if word in words.split():
+                parts.setdefault(part, column)
+    names = [parts[part] for part in _NAMES if part in parts]
+    columns = [table.likely_numbers(name) for name in names]
+    numbers = [column for column in columns if column is not None]
+    is_clock = {"hour", "minute", "second"} <= parts.keys()
+    if not is_clock or len(numbers) not in (3, 6) or len(columns) != len(numbers):
+        return table
+    times = [_written(row) for row in np.column_stack(numbers).tolist()]
+    joined = " ".join(names)
+    others = {name: one for name, one in table.cells.items() if name not in names}
+    return replace(table, cells={f"Time ({joined})": np.array(times, object), **others})
 
 
-def _written(cells: tuple[str, ...]) -> str:
-    """Date and clock time of their parts; ValueError for what are no numbers."""
-    if not all(cells):
+def _written(parts: list[float]) -> str:
+    """Date and clock time of their parts; empty where one is missing."""
+    if np.isnan(parts).any():
         return ""
-    *date, hour, minute, second = (float(cell.replace(",", ".")) for cell in cells)
+    *date, hour, minute, second = parts
     clock = f"{hour:02.0f}:{minute:02.0f}:{second:09.6f}"
     if not date:
         return clock

@@ -1,7 +1,6 @@
 """Numbers as instruments write them in cells, and words for "no value"."""
 
 import re
-from typing import NamedTuple
 
 from shipgym.trials.units import spelled_units
 
@@ -27,6 +26,8 @@ _WITH_SIDE = [
 def is_missing(text: str) -> bool:
     """Return whether a cell stands for "no value": blank, signs alone, or a word."""
     bare = text.strip()
+    if bare[-1:].isdigit():
+        return False
     has_letters = any(letter.isalnum() for letter in bare)
     return not has_letters or _MISSING_WORDS.fullmatch(bare) is not None
 
@@ -40,13 +41,26 @@ def is_number(text: str) -> bool:
     return "_" not in text
 
 
+def cell_number(text: str) -> float | None:
+    """A number, with a side or a unit or neither; None for other text."""
+    text = text.replace("\u2212", "-")  # a minus as typographers write it
+    if is_number(text):
+        return float(text)
+    number = number_with_side(text)
+    if number is None and unit_in_cell(text):
+        match = _WITH_UNIT.fullmatch(text)
+        number = float(match[1]) if match else None
+    return number
+
+
 def number_with_side(text: str) -> float | None:
     """Number of a text such as "S10.0", "10 PORT" or "P 5"; None for others.
 
     To starboard positive.
     """
     bare = text.lower()
-    if not any(letter.isalpha() for letter in bare):
+    has_letters = any(letter.isalpha() for letter in bare)
+    if not has_letters:
         return None
     for sign, pattern in _WITH_SIDE:
         match = pattern.fullmatch(bare)
@@ -55,19 +69,10 @@ def number_with_side(text: str) -> float | None:
     return None
 
 
-class Measured(NamedTuple):
-    """A number with its unit."""
-
-    number: float
-    unit: str
-
-
-def number_with_unit(text: str) -> Measured | None:
-    """Number and unit of a text such as "13.6 kn"; None for others."""
+def unit_in_cell(text: str) -> list[str]:
+    """Units that stand behind a number such as "13.6 kn"; none for other texts."""
     match = _WITH_UNIT.fullmatch(text)
     if match is None:
-        return None
-    is_true = match[2] == "T"  # a bearing from true north
-    if not is_true and not spelled_units(match[2].lower()):
-        return None
-    return Measured(float(match[1]), match[2])
+        return []
+    # T: a bearing from true north
+    return ["deg"] if match[2] == "T" else spelled_units(match[2].lower())

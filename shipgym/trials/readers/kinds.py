@@ -1,10 +1,7 @@
 """Kinds of logs, recognised by name and beginning of a file, and their readers."""
 
-import io
 import re
-import zipfile
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 from shipgym.errors import InputError
@@ -15,15 +12,12 @@ from shipgym.trials.readers.frames import read_excel, read_parquet
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.readers.matlab import read_matlab
 from shipgym.trials.readers.text_files import read_log_bytes
-from shipgym.trials.readers.value_lines import read_dataflash, read_moos
 
 _READERS: dict[str, Callable[[Path, bytes], LogTable]] = {
     "csv": read_csv,
     "excel": read_excel,
     "matlab": read_matlab,
     "parquet": read_parquet,
-    "moos": read_moos,
-    "dataflash": read_dataflash,
 }
 _ENDINGS = {".xlsx": "excel", ".mat": "matlab", ".parquet": "parquet"}
 _MAGIC = {b"PAR1": "parquet", b"MATLAB 5.0": "matlab", b"MATLAB 7.3": "matlab"}
@@ -52,15 +46,7 @@ def recognise_kind(path: Path, content: bytes) -> str:
     for magic, kind in _MAGIC.items():
         if content.startswith(magic):
             return kind
-    if content.startswith(b"PK\x03\x04"):
-        with suppress(zipfile.BadZipFile, ValueError, OSError, NotImplementedError):
-            if "xl/workbook.xml" in zipfile.ZipFile(io.BytesIO(content)).namelist():
-                return "excel"
     beginning = content[:4096].decode("latin-1").replace("\r", "\n")
-    if beginning.startswith("%%") and "LOGSTART" in beginning:
-        return "moos"
-    if beginning.startswith("FMT, "):
-        return "dataflash"
     if len(_MESSAGES.findall(beginning)) >= 2:
         return "messages"
     _refuse_foreign(path, content)

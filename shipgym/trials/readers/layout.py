@@ -5,9 +5,11 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
+from statistics import mode
 from typing import NamedTuple
 
-from shipgym.trials.readers.cell_texts import is_missing
+from shipgym.errors import InputError
+from shipgym.trials.readers.cell_texts import is_missing, is_number
 from shipgym.trials.units import split_unit
 
 BLANKS = " "  # for a delimiter: any number of them
@@ -79,22 +81,18 @@ def _likely_delimiters(lines: Iterable[str]) -> list[str]:
 def layout_of_rows(rows: Mapping[int, list[str]]) -> Layout | None:
     """Layout of rows of cells by their numbers; None where no names fit the values."""
     data = [number for number, cells in rows.items() if is_data(cells)]
-    widths = Counter(len(rows[number]) for number in data)
-    if not widths:
-        return None
-    (n_cells, count), *_ = widths.most_common(1)
-    if n_cells < 2 or count < len(data) // 2:
+    n_cells = mode([len(rows[number]) for number in data] or [0])
+    if n_cells < 2:
         return None
 
     first = next(number for number in data if len(rows[number]) == n_cells)
     # a comma too many at the end of each row
-    ends_blank = not rows[first][-1].strip()
+    may_lack = () if rows[first][-1].strip() else (1,)
     names: list[int] = []
     units: list[int] = []
     for number, cells in rows.items():
-        n_named = len(without_spare(cells, n_cells))
-        fits = n_named == n_cells or (ends_blank and n_named == n_cells - 1)
-        if number < first and fits:
+        lacking = n_cells - len(without_spare(cells, n_cells))
+        if number < first and lacking in (0, *may_lack):
             is_units = is_unit_row(cells, is_below=bool(names))
             (units if is_units else names).append(number)
     if not names:
@@ -106,6 +104,34 @@ def layout_of_rows(rows: Mapping[int, list[str]]) -> Layout | None:
 def _distinct(cells: Sequence[str]) -> int:
     """Number of different names."""
     return len({cell.strip() for cell in cells} - {""})
+
+
+def check_names(where: str, names: Sequence[str]) -> None:
+    """Refuse names of columns that are numbers, repeated, binary or too many."""
+    most = 1000
+    if len(names) > most:
+        raise InputError(
+            f"{where}: expected at most {most} columns, got {len(names)};"
+            " leave out those that are not needed"
+        )
+    numbers = [name for name in names if is_number(name.replace(",", "."))]
+    if 2 * len(numbers) > len(names):
+        raise InputError(
+            f"{where}: expected a header with column names such as t,psi,u,v,r,delta,"
+            f" got only numbers ({', '.join(numbers[:4])}); write the names in a line"
+            " above"
+        )
+    for name, count in Counter(names).items():
+        if not name.isprintable():
+            raise InputError(
+                f"{where}: expected column names, got {name!r}; save the table as"
+                " comma-separated text in UTF-8"
+            )
+        if name and count > 1:
+            raise InputError(
+                f"{where}: expected each column once, got '{name}' {count} times;"
+                " rename or remove one"
+            )
 
 
 def unit_texts(

@@ -16,9 +16,6 @@ _CLOCK = re.compile(
     r"(?P<time>\d\d?:\d\d:\d\d(?:[.,]\d+)?)"
     r" ?(?P<zone>Z|UTC|[+-]\d\d:?\d\d)?"
 )
-_COMPACT = re.compile(
-    r"(?<!\d)(\d{4})(\d\d)(\d\d)[-T _]?([0-2]\d)([0-5]\d)([0-5]\d(?:\.\d+)?)(?!\d)"
-)
 #: Seconds or fractions of them since 1970, or seconds with decimals since some start.
 _NUMBER = re.compile(r"(?<![\w.:/-])A?(\d{9,19}(?:\.\d+)?|\d+\.\d+)(?![\w.:/])")
 
@@ -35,10 +32,6 @@ def stamp_text(before: str) -> str:
     clock = _CLOCK.search(before)
     if clock is not None:
         return clock_text_of(clock)
-    compact = _COMPACT.search(before)
-    if compact is not None:  # such as 20210503T095950
-        year, month, day, hour, minute, second = compact.groups()
-        return f"{year}-{month}-{day} {hour}:{minute}:{second}"
     number = _NUMBER.search(before)
     return "" if number is None else number[1]
 

@@ -1,8 +1,6 @@
 """A log as a table of named columns, which every reader returns."""
 
-import re
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,12 +10,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
-from shipgym.trials.readers.cell_texts import (
-    is_missing,
-    is_number,
-    number_with_side,
-    number_with_unit,
-)
+from shipgym.trials.readers.cell_texts import cell_number, is_missing
 
 #: The setting with which missing values are filled.
 REPAIR = ("repair", "interpolate")
@@ -46,8 +39,8 @@ class LogTable:
     ----------
     path : Path
         The file, for messages.
-    cells : mapping of str to sequence
-        Cells of each column: texts or other objects, or an array of numbers.
+    cells : mapping of str to array
+        Cells of each column: numbers, or texts and other objects.
     rows : sequence of int
         Line or row of the file in which each row of the table stands.
     place_words : str
@@ -76,7 +69,7 @@ class LogTable:
     notes: tuple[str, ...] = ()
     own_clocks: bool = False
     magnetic: bool = False
-    _parsed: dict[tuple[str, bool], _Parsed] = field(
+    _parsed: dict[str, _Parsed] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
 
@@ -107,154 +100,108 @@ class LogTable:
     def plain_numbers(self, name: str) -> Floats | None:
         """A column that the reader knows as numbers; None for others."""
         cells = self.column(name)
-        if isinstance(cells, np.ndarray) and cells.dtype.kind in "fiub":
+        if cells.dtype.kind in "fiub":
             return np.asarray(cells, dtype=np.float64)
         return None
 
     def texts(self, name: str) -> list[str]:
-        """Cells of a column as stripped texts, empty where there is no value."""
-        texts = [str(cell).strip() for cell in self.column(name)]
-        return ["" if is_missing(text) else text for text in texts]
+        """Cells of a column as texts with decimal points, empty without a value."""
+        return [self._text(cell) for cell in self.column(name).tolist()]
+
+    def _text(self, cell: Any) -> str:
+        text = str(cell).strip()
+        if self.decimal_comma and "." not in text:
+            text = text.replace(",", ".")
+        return "" if is_missing(text) else text
 
     def first_text(self, name: str) -> str:
-        """The first cell with a value as a stripped text; empty without one."""
-        texts = (str(cell).strip() for cell in self.column(name))
-        return next((text for text in texts if not is_missing(text)), "")
+        """The first cell with a value as a text; empty without one."""
+        return next(filter(None, map(self._text, self.column(name))), "")
 
-    def numbers(self, name: str, *, sided: bool = False) -> Floats:
+    def numbers(self, name: str) -> Floats:
         """A column as numbers, nan where there is no value.
 
-        With `sided`, "S10.0" and "10 PORT" are 10 to starboard, which is positive, and
-        to port. Raises InputError for other text.
+        "S10.0" and "10 PORT" are 10 to starboard, which is positive, and to port.
+        Raises InputError for other text.
         """
-        parsed = self._parse(name, sided=sided)
+        parsed = self._parse(name)
         if parsed.odd:
-            raise self._no_number(parsed.odd[0], name)
+            row = parsed.odd[0]
+            raise InputError(
+                f"{self.cell(row, name)}: expected a number, got"
+                f" '{str(self.cells[name][row]).strip()}'; correct the cell, or leave"
+                ' it out and fill it from its neighbours with repair = "interpolate"',
+                [REPAIR],
+            )
         return parsed.numbers.copy()
 
-    def likely_numbers(self, name: str, *, sided: bool = False) -> Floats | None:
+    def likely_numbers(self, name: str) -> Floats | None:
         """A column as numbers, nan for the odd cell with other text.
 
         None where other texts are more than a few.
         """
-        parsed = self._parse(name, sided=sided)
+        parsed = self._parse(name)
         return parsed.numbers.copy() if parsed.is_likely else None
 
     def without_odd_cells(self, names: Sequence[str], time: str) -> "LogTable":
         """The table without the few cells of some columns that are no numbers.
 
-        A row whose `time` is odd is left out. The notes name what was left out.
+        A row whose `time` is missing or odd is left out. The notes name what was.
         """
         cells = dict(self.cells)
         notes = []
         for name in names:
-            parsed = self._parse(name, sided=True)
-            if name == time or not parsed.odd or not parsed.is_likely:
-                continue
-            column = list(cells[name])
-            first = str(column[parsed.odd[0]]).strip()
-            for row in parsed.odd:
-                column[row] = ""
-            cells[name] = column
-            place = self.cell(parsed.odd[0], name)
-            notes.append(f"{place}: {first!r} is no number{_and_more(parsed.odd)}")
-        whole = replace(self, cells=cells, notes=(*self.notes, *notes))
-        return whole._without_odd_times(time)
+            parsed = self._parse(name)
+            if name != time and parsed.odd and parsed.is_likely:
+                cells[name] = parsed.numbers
+                notes.append(self._odd_note(name, parsed.odd, "number"))
+        rows = self.rows
+        odd = self._odd_times(time)
+        most = max(1.0, ODD_SHARE * len(rows))
+        if 0 < len(odd) <= most:
+            notes.append(self._odd_note(time, odd, "time, the row is left out"))
+            cells = {name: np.delete(column, odd) for name, column in cells.items()}
+            rows = np.delete(rows, odd).tolist()
+        return replace(self, cells=cells, rows=rows, notes=(*self.notes, *notes))
 
-    def _without_odd_times(self, name: str) -> "LogTable":
-        """The table without the few rows that have no time, as a footer."""
-        plain = self.plain_numbers(name)
-        if plain is not None and np.isfinite(plain).all():
-            return self
-        texts = self.texts(name)
-        odd = self._odd_times(name, texts)
-        if not 0 < len(odd) <= max(1.0, ODD_SHARE * len(texts)):
-            return self
-        first = min(odd)
-        place = self.cell(first, name)
-        found = texts[first] or "nothing"
-        note = f"{place}: {found!r} is no time, the row is left out{_and_more(odd)}"
-        kept = np.delete(np.arange(len(texts)), odd).tolist()
-        return self._of_rows(kept, note)
+    def _odd_note(self, name: str, odd: list[int], what: str) -> str:
+        found = str(self.cells[name][odd[0]]).strip() or "nothing"
+        more = f", as in {len(odd) - 1} more" if len(odd) > 1 else ""
+        return f"{self.cell(odd[0], name)}: {found!r} is no {what}{more}"
 
-    def _of_rows(self, kept: Sequence[int], note: str) -> "LogTable":
-        """The table of some of the rows, and a further note."""
-        cells = {}
-        for name, column in self.cells.items():
-            is_array = isinstance(column, np.ndarray)
-            cells[name] = column[kept] if is_array else [column[k] for k in kept]
-        rows = [self.rows[k] for k in kept]
-        return replace(self, cells=cells, rows=rows, notes=(*self.notes, note))
-
-    def _odd_times(self, name: str, texts: Sequence[str]) -> list[int]:
+    def _odd_times(self, name: str) -> list[int]:
         """Rows whose time is missing, or is neither a number nor a clock time."""
-        odd = list(self._parse(name, sided=False).odd)
-        if len(odd) > ODD_SHARE * len(texts):  # clock times
-            odd = [row for row, text in enumerate(texts) if text and not _DIGIT(text)]
-        missing = [row for row, text in enumerate(texts) if not text]
-        return odd + missing
+        numbers, odd = self._parse(name)
+        is_missing = np.isnan(numbers)
+        missing = np.flatnonzero(is_missing).tolist()
+        if len(odd) <= ODD_SHARE * len(numbers):
+            return missing
+        texts = self.texts(name)  # clock times
+        return [row for row in missing if not any(map(str.isdigit, texts[row]))]
 
-    def _parse(self, name: str, *, sided: bool) -> _Parsed:
+    def _parse(self, name: str) -> _Parsed:
         """Numbers of a column and its odd rows, worked out once."""
-        key = (name, sided)
-        known = self._parsed.get(key)
+        known = self._parsed.get(name)
         if known is None:
-            known = self._parse_cells(name, sided=sided)
-            self._parsed[key] = known
+            known = self._parsed[name] = self._parse_cells(name)
         return known
 
-    def _parse_cells(self, name: str, *, sided: bool) -> _Parsed:
+    def _parse_cells(self, name: str) -> _Parsed:
+        import pandas as pd
+
         plain = self.plain_numbers(name)
         if plain is not None:
             return _Parsed(plain, [])
-        cells = self.column(name)
-        with suppress(ValueError, TypeError, OverflowError):
-            return _Parsed(np.array([_plain_number(cell) for cell in cells]), [])
-        numbers = np.full(len(cells), np.nan)
+        texts = np.array(self.texts(name), dtype=object)
+        numbers = np.array(pd.to_numeric(texts, errors="coerce"), dtype=np.float64)
         odd = []
-        for row, text in enumerate(self.texts(name)):
-            number = self._number(text, sided=sided) if text else np.nan
+        known = {"": np.nan}  # many rows share a text
+        missing = np.flatnonzero(np.isnan(numbers)).tolist()
+        for row in missing:
+            text = texts[row]
+            number = known[text] if text in known else cell_number(text)
             if number is None:
                 odd.append(row)
             else:
-                numbers[row] = number
+                numbers[row] = known[text] = number
         return _Parsed(numbers, odd)
-
-    def _number(self, text: str, *, sided: bool) -> float | None:
-        """A number, with a side or a unit or neither; None for other text."""
-        if self.decimal_comma and "." not in text:
-            text = text.replace(",", ".")
-        # a minus as typographers write it
-        text = text.replace("\u2212", "-")
-        if is_number(text):
-            return float(text)
-        with_side = number_with_side(text) if sided else None
-        if with_side is not None:
-            return with_side
-        with_unit = number_with_unit(text)
-        return with_unit.number if with_unit else None
-
-    def _no_number(self, row: int, name: str) -> InputError:
-        place = self.cell(row, name)
-        text = self.texts(name)[row]
-        return InputError(
-            f"{place}: expected a number, got '{text}'; correct the cell, or leave it"
-            ' out and fill it from its neighbours with repair = "interpolate"',
-            [REPAIR],
-        )
-
-
-_DIGIT = re.compile(r"\d").search
-
-
-def _and_more(rows: Sequence[int]) -> str:
-    """How many more rows a note is about."""
-    more = len(rows) - 1
-    return f", as in {more} more" if more else ""
-
-
-def _plain_number(cell: Any) -> float:
-    """Number of a cell that is plainly written or empty; ValueError for others."""
-    if "_" in str(cell):
-        raise ValueError("an underscore, which Python reads in a number")
-    return np.nan if cell == "" else float(cell)

@@ -43,7 +43,7 @@ def read_matlab(path: Path, content: bytes) -> LogTable:
     """Read the numeric vectors of the commonest length, each as a column by its name.
 
     Those of a matrix are numbered: ``simdata(:,2)``. Raises InputError for a damaged or
-    large file, one of version 7.3, one without vectors, and complex numbers.
+    large file, one of version 7.3, and one without vectors of real numbers.
     """
     vectors = _all_vectors(path, content)
     lengths = [values.size for values in vectors.values()]
@@ -74,7 +74,7 @@ def _all_vectors(path: Path, content: bytes) -> dict[str, Any]:
     with damage_reported(path, "MATLAB (.mat)", remedy):
         matrices = _matrices(path, content[_HEADER_BYTES:], order)
         for matrix in islice(matrices, _MOST_MATRICES):
-            vectors |= _vectors(path, matrix, order)
+            vectors |= _vectors(matrix, order)
     return vectors
 
 
@@ -93,7 +93,7 @@ def _matrices(path: Path, content: bytes, order: str) -> Iterator[bytes]:
             yield element
 
 
-def _vectors(path: Path, matrix: bytes, order: str) -> dict[str, Any]:
+def _vectors(matrix: bytes, order: str) -> dict[str, Any]:
     """Numbers of a numeric matrix by its name, of one with columns by their numbers."""
     parts = list(islice(_elements(matrix, order), 4))
     if len(parts) < 4 or parts[3][0] not in _NUMBER_TYPES:
@@ -102,17 +102,10 @@ def _vectors(path: Path, matrix: bytes, order: str) -> dict[str, Any]:
     values = np.frombuffer(numbers, order + _NUMBER_TYPES[number_type])
     sizes = np.frombuffer(shape, f"{order}i4")
     is_table = sizes.size == 2 and np.prod(sizes) == values.size
-    (about,) = struct.unpack(f"{order}I", flags[:4])
-    if not is_table or (about & _CLASS) < _FIRST_NUMERIC:
+    about, *_ = np.frombuffer(flags, f"{order}u4")
+    if not is_table or (about & _CLASS) < _FIRST_NUMERIC or about & _COMPLEX:
         return {}
-    label = name.decode("ascii")
-    columns = _columns(label, values.reshape(sizes, order="F"))
-    if columns and about & _COMPLEX:
-        raise InputError(
-            f"{path}: variable {label!r}: expected real numbers, got complex ones; save"
-            " real(...)"
-        )
-    return columns
+    return _columns(name.decode("ascii"), values.reshape(sizes, order="F"))
 
 
 def _columns(name: str, array: Any) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """The clock of a log of messages: what satellites say, and stamps before the lines."""
 
 from collections import Counter, defaultdict
-from operator import itemgetter
 from pathlib import Path
 from typing import NamedTuple
 
@@ -31,63 +30,44 @@ def log_clock(path: Path, heard: Heard, notes: list[str]) -> Clock | None:
     satellites they are put right. Raises InputError for a clock that was set back.
     """
     own = _own_clock(path, heard.times)
-    stamps = _stamp_clock(heard)
-    clock = stamps or own
-    if own is not None and stamps is not None:
-        clock = _agreed(stamps, own, heard.times[own.source], notes)
+    clock = _stamp_clock(heard) or own
     if clock is None:
         return None
-    heard.order.sort(key=itemgetter(0))
-    return _with_bursts(clock, heard.order)
-
-
-def _agreed(stamps: Clock, own: Clock, values: list[Value], notes: list[str]) -> Clock:
-    """Stamps put right by the times of satellites; these where both do not agree."""
-    ahead = _ahead(stamps, values)
-    least, middle, most = np.quantile(ahead, [0.1, 0.5, 0.9])
-    if most - least > 2.0:
-        notes.append(
-            f"times before the lines do not run with those of {own.source}: left out"
-        )
-        return own
-    if abs(middle) <= 1.0:  # a message takes part of a second
-        return stamps
-    if is_dated(stamps.t[0]):
-        size = f"{middle:.6g} s"
-        days = middle / DAY
-        if abs(days) > 1.0:
-            size = f"{days:.3g} days"
-        notes.append(
-            f"the times before the lines are {size} ahead of those of {own.source},"
-            " which are taken"
-        )
-    return stamps._replace(t=stamps.t - middle)
+    if own is not None and clock is not own:
+        ahead = _ahead(clock, heard.times[own.source])
+        least, middle, most = np.quantile(ahead, [0.1, 0.5, 0.9]).tolist()
+        if most - least > 2.0:
+            words = "do not run with those of {source}: left out"
+            clock = own
+        else:
+            words = f"are {middle:.6g} s ahead of those of {{source}}, which are taken"
+            if abs(middle) > 1.0:  # a message takes part of a second
+                clock = clock._replace(t=clock.t - middle)
+        if clock is own or (abs(middle) > 1.0 and is_dated(own.t[0])):
+            words = words.format(source=own.source)
+            notes.append(f"the times before the lines {words}")
+    return _with_bursts(clock, sorted(heard.order))
 
 
 def _own_clock(path: Path, times: BySource) -> Clock | None:
     """Times of the source that gives a date, of those the busiest one."""
     if not times:
         return None
-
-    def rank(source: str) -> tuple[bool, int]:
-        moments = {value.time for value in times[source]}
-        earliest = min(moments)
-        return is_dated(earliest), len(moments)
-
-    best = max(sorted(times), key=rank)
+    moments = {source: {one.time for one in values} for source, values in times.items()}
+    best = max(
+        sorted(times), key=lambda one: (is_dated(min(moments[one])), len(moments[one]))
+    )
     lines, t, _ = np.array(times[best]).T
     if not is_dated(t[0]):
         t = np.unwrap(t, period=DAY)
-    goes_back = np.flatnonzero(np.diff(t) < -5.0)
-    if goes_back.size:
-        last = goes_back[0]
-        back = last + 1
-        before = clock_text(t[last])
-        after = clock_text(t[back])
-        line = int(lines[back])
+    goes_back = np.diff(t) < -5.0
+    if goes_back.any():
+        last = int(goes_back.argmax())
+        before, after = map(clock_text, t[last : last + 2])
         raise InputError(
-            f"{path}: line {line}: expected time to go on, got {after} after {before};"
-            " the clock was set back, or two logs are joined: cut the log there"
+            f"{path}: line {lines[last + 1]:.0f}: expected time to go on, got"
+            f" {after} after {before}; the clock was set back, or two logs are joined:"
+            " cut the log there"
         )
     return _increasing(t, lines, best)
 
@@ -96,18 +76,15 @@ def _stamp_clock(heard: Heard) -> Clock | None:
     """Times before the lines; None where few lines have one or they go back."""
     if len(heard.stamps) < 0.5 * heard.count:
         return None
-    stamps = sorted(heard.stamps.items())
-    texts = [text for _, text in stamps]
+    numbers, texts = zip(*sorted(heard.stamps.items()), strict=True)
     t = read_stamps(texts)
     is_known = np.isfinite(t)
-    lines = np.array([line for line, _ in stamps], dtype=np.float64)
-
+    lines = np.array(numbers, dtype=np.float64)[is_known]
     t = t[is_known]
-    moments = np.unique(t).size
     goes_back = np.diff(t) < 0.0
-    if moments < 3 or goes_back.mean() > 0.01:
+    if np.unique(t).size < 3 or goes_back.mean() > 0.01:
         return None
-    return _increasing(t, lines[is_known], "stamps of the lines")
+    return _increasing(t, lines, "stamps of the lines")
 
 
 def _increasing(t: Floats, lines: Floats, source: str) -> Clock:
@@ -122,11 +99,11 @@ def _ahead(stamps: Clock, values: list[Value]) -> Floats:
     after = np.searchsorted(stamps.lines, lines, side="right")
     at = np.maximum(after - 1, 0)
     ahead: Floats = stamps.t[at] - t
-    if is_dated(t[0]):  # stamps of the day take the day of the messages
-        return ahead
-    of_day: Floats = np.unwrap(ahead, period=DAY)
-    days = np.round(np.median(of_day) / DAY)
-    return of_day - DAY * days
+    if not is_dated(t[0]):  # stamps of the day take the day of the messages
+        ahead = np.unwrap(ahead, period=DAY)
+        days = np.median(ahead) / DAY
+        ahead -= DAY * np.round(days)
+    return ahead
 
 
 def times_of(values: list[Value], clock: Clock) -> Floats:
@@ -160,12 +137,9 @@ def _spread(lines: Floats, clock: Clock) -> Floats:
         return np.interp(lines, clock.lines, clock.t)
     moments = np.searchsorted(clock.lines, lines, side="right")
     _, counts = np.unique(moments, return_counts=True)
-    median = float(np.median(counts))
-    usual = max(1, round(median))
-    begins_before = moments[0] == 0 and counts[0] >= usual
-    if begins_before and clock.leads:
-        following = np.searchsorted(clock.lines, lines, side="left")
-        moments = 1 + following
+    usual = max(1, round(float(np.median(counts))))
+    if clock.leads and moments[0] == 0 and counts[0] >= usual:
+        moments = 1 + np.searchsorted(clock.lines, lines, side="left")
     step = float(np.median(np.diff(clock.t)))
     begins = np.concatenate([[clock.t[0] - step], clock.t])
     return spread_evenly(moments, begins, step, usual)
@@ -178,16 +152,12 @@ def _with_bursts(clock: Clock, order: list[tuple[int, str]]) -> Clock:
     after its last time.
     """
     lines = [line for line, _ in order]
-    moments = np.searchsorted(clock.lines, lines, side="right")
+    moments = np.searchsorted(clock.lines, lines, side="right").tolist()
     bursts: dict[int, str] = defaultdict(str)
-    for moment, (_, source) in zip(moments.tolist(), order, strict=True):
+    for moment, (_, source) in zip(moments, order, strict=True):
         bursts[moment] += f"{source} "
-
-    counts = Counter(bursts.values())
-    ((usual, most),) = counts.most_common(1)
-    last = clock.lines.size
-    is_whole = bursts[last] + bursts[0] == usual
+    ((usual, most),) = Counter(bursts.values()).most_common(1)
     return clock._replace(
         in_bursts=most > 0.6 * len(bursts),
-        leads=is_whole,
+        leads=bursts[clock.lines.size] + bursts[0] == usual,
     )

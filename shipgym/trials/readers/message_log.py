@@ -62,7 +62,7 @@ def read_messages(path: Path, content: bytes) -> LogTable:
     winds = {name: tracks.pop(name) for name in chosen.by_channel if is_wind(name)}
     if winds and "psi" in tracks:
         tracks |= wind_over_ground(winds, tracks)
-    notes += chosen.notes + _settle_speed(tracks)
+    notes += chosen.notes
     return _table(path, tracks, notes, magnetic=chosen.magnetic)
 
 
@@ -83,43 +83,16 @@ def _check_damage(path: Path, heard: Heard) -> list[str]:
     ]
 
 
-def _settle_speed(tracks: dict[str, Track]) -> list[str]:
-    """Leave out a course alone, and a speed over ground alone where more is known.
-
-    Such a speed is else taken as through the water. A note says so, or that no speed is
-    known.
-    """
-    notes = []
-    if "sog" not in tracks or "cog" not in tracks:
-        tracks.pop("cog", None)
-    if "sog" in tracks and "cog" not in tracks:
-        alone = tracks.pop("sog")
-        if {"lat", "stw"} & tracks.keys():
-            notes = ["the speed over ground has no course beside it and is left out"]
-        else:
-            tracks["stw"] = alone
-            notes = [
-                "the speed over ground is taken as through the water, as there is no"
-                " course over ground"
-            ]
-    if not {"lat", "sog", "stw"} & tracks.keys():
-        notes.append(
-            "no speed is known: the log has neither positions (RMC, GGA, GLL) nor a"
-            " speed (VTG, VHW, VBW); give the service speed in the ship file"
-        )
-    return notes
-
-
 def _table(
     path: Path, tracks: dict[str, Track], notes: list[str], *, magnetic: bool
 ) -> LogTable:
     """One row for each time at which some channel has a value."""
     t = np.unique(np.concatenate([track.t for track in tracks.values()]))
     columns = {"t": t}
-    first_lines = np.full(t.size, np.inf)
+    first_lines = np.full_like(t, np.inf)
     for channel, track in tracks.items():
         rows = np.searchsorted(t, track.t)
-        columns[channel] = np.full(t.size, np.nan)
+        columns[channel] = np.full_like(t, np.nan)
         columns[channel][rows] = track.values
         first_lines[rows] = np.minimum(first_lines[rows], track.lines)
     return LogTable(

@@ -1,6 +1,6 @@
 """Of several sources of a channel the one to read, and a log's channels over time."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.trials.clock_texts import is_dated
 from shipgym.trials.readers.message_clock import Clock, times_of
-from shipgym.trials.readers.messages import BySource, Heard, port_source
+from shipgym.trials.readers.messages import Heard, Value
 from shipgym.trials.resampling import FEWEST_SAMPLES
 from shipgym.trials.units import DEGREE
 
@@ -25,6 +25,12 @@ class Track(NamedTuple):
     lines: Floats
     values: Floats
     source: str
+    has_dates: bool = False
+
+    @property
+    def words(self) -> str:
+        """The source, and how many values it has."""
+        return f"{self.source} ({self.t.size} value{'s' * (self.t.size != 1)})"
 
     @property
     def covered(self) -> float:
@@ -53,27 +59,27 @@ def choose_tracks(heard: Heard, clock: Clock) -> Tracks:
     tracks = found.by_channel
     longest = 0.0
     for channel, sources in heard.channels.items():
-        of_source = _tracks_of(sources, clock)
-        longest = max(longest, *(track.covered for track in of_source.values()))
-        seconds = {port_source(source) for source in sources}
-        singles = {name: sources[name] for name in sources if name not in seconds}
-        best = _best_source(of_source, singles)
-        tracks[channel] = of_source[best]
-        if channel != "variation":
+        of_source = [
+            _track(source, sources[source], clock) for source in sorted(sources)
+        ]
+        longest = max(longest, *(track.covered for track in of_source))
+        best = tracks[channel] = _best(channel, of_source)
+        others = [track.words for track in of_source if track is not best]
+        if others and channel != "variation":
             name = channel.removesuffix("_magnetic")
-            found.notes += _note_others(name, best, singles)
-        if channel == "delta":
-            _choose_rudder(found, of_source, best)
+            found.notes.append(
+                f"{name} is from {best.words}; {', '.join(others)} left out"
+            )
 
-    if {"sog", "cog"} <= tracks.keys():  # at rest there is no course
-        sog, cog = tracks["sog"], tracks["cog"]
-        t, of_sog, of_cog = np.intersect1d(sog.t, cog.t, return_indices=True)
-        lines = sog.lines[of_sog]
-        tracks["sog"] = Track(t, lines, sog.values[of_sog], sog.source)
-        tracks["cog"] = Track(t, lines, cog.values[of_cog], cog.source)
     _choose_heading(found)
     tracks.pop("variation", None)
-    _leave_out_rare(found, longest)
+    for channel, track in list(tracks.items()):
+        is_needed = channel in ("psi", "delta") or track.covered >= 0.1 * longest
+        if not is_needed or track.t.size < FEWEST_SAMPLES:
+            del tracks[channel]
+            found.notes.append(
+                f"{channel} of {track.source} left out: only {track.t.size} values"
+            )
     by_source: dict[str, list[str]] = {}
     for channel, track in tracks.items():
         by_source.setdefault(track.source, []).append(channel)
@@ -82,87 +88,31 @@ def choose_tracks(heard: Heard, clock: Clock) -> Tracks:
     return found
 
 
-def _leave_out_rare(found: Tracks, longest: float) -> None:
-    """Leave out channels with hardly any values, with a note."""
-    for channel, track in list(found.by_channel.items()):
-        count = track.t.size
-        is_needed = channel in ("psi", "delta")
-        is_rare = track.covered < 0.1 * longest
-        if (is_rare and not is_needed) or count < FEWEST_SAMPLES:
-            del found.by_channel[channel]
-            found.notes.append(
-                f"{channel} of {track.source} left out: only {count} values"
-            )
+def _track(source: str, values: list[Value], clock: Clock) -> Track:
+    """Values of a source at their own times, else at those of their lines."""
+    lines, times, numbers = np.array(values).T
+    # to a tenth of a millisecond
+    t, first = np.unique(np.round(times_of(values, clock), 4), return_index=True)
+    return Track(t, lines[first], numbers[first], source, is_dated(times[0]))
 
 
-def _tracks_of(sources: BySource, clock: Clock) -> dict[str, Track]:
-    """Values of each source at their own times, else at those of their lines."""
-    tracks = {}
-    for source in sorted(sources):
-        values = sources[source]
-        lines, _, numbers = np.array(values).T
-        # to a tenth of a millisecond
-        t = np.round(times_of(values, clock), 4)
-        t, first = np.unique(t, return_index=True)
-        tracks[source] = Track(t, lines[first], numbers[first], source)
-    return tracks
+def _best(channel: str, tracks: Sequence[Track]) -> Track:
+    """The source to read, by the most important criterion first."""
+    most = max(track.covered for track in tracks)
 
-
-def _best_source(tracks: dict[str, Track], sources: BySource) -> str:
-    most = max(tracks[source].covered for source in sources)
-
-    def rank(source: str) -> tuple[bool, int, bool, bool, int]:
-        """The most important criterion first; II is a display that repeats others."""
-        (first, *_) = sources[source]
+    def rank(track: Track) -> tuple[object, ...]:
+        """II is a display that repeats others; of two rudders one may stand still."""
         return (
-            tracks[source].covered >= 0.5 * most,
-            _PREFERENCE.get(source[2:5], 0),
-            is_dated(first.time),
-            not source.startswith("II"),
-            tracks[source].t.size,
+            track.covered >= 0.5 * most,
+            channel != "delta" or np.ptp(track.values) > 0.5 * DEGREE,
+            _PREFERENCE.get(track.source[2:5], 0),
+            track.has_dates,
+            not track.source.startswith("II"),
+            track.t.size,
+            not track.source.endswith(" port"),
         )
 
-    return max(sorted(sources), key=rank)
-
-
-def _note_others(channel: str, best: str, sources: BySource) -> list[str]:
-    counts = {}
-    for source in sorted(sources):
-        count = len(sources[source])
-        counts[source] = f"{source} ({count} {'values' if count != 1 else 'value'})"
-    chosen = counts.pop(best)
-    if not counts:
-        return []
-    return [f"{channel} is from {chosen}; {', '.join(counts.values())} left out"]
-
-
-def _choose_rudder(found: Tracks, tracks: dict[str, Track], best: str) -> None:
-    """The rudder, of two the mean, unless one of them stands still."""
-    track = tracks[best]
-    speaker, *_ = best.split()
-    if best == port_source(speaker):
-        found.notes.append(f"delta is the rudder in the port field of {speaker}")
-    port = tracks.get(port_source(best))
-    if port is None:
-        return
-    moves = np.ptp(track.values) > 0.5 * DEGREE
-    port_moves = np.ptp(port.values) > 0.5 * DEGREE
-    if moves != port_moves:
-        side, still = ("starboard", "port") if moves else ("port", "starboard")
-        found.notes.append(
-            f"delta is the {side} rudder of {best}: the {still} one is still"
-        )
-        if port_moves:
-            found.by_channel["delta"] = port
-        return
-    of_port = port.at(track.t)
-    apart_deg = np.mean(track.values - of_port) / DEGREE
-    found.notes.append(
-        f"delta is the mean of two rudders of {best}; the starboard one shows"
-        f" {apart_deg:.2g} deg more than the port one on average"
-    )
-    mean = 0.5 * (track.values + of_port)
-    found.by_channel["delta"] = track._replace(values=mean)
+    return max(tracks, key=rank)
 
 
 def _choose_heading(found: Tracks) -> None:
@@ -172,31 +122,28 @@ def _choose_heading(found: Tracks) -> None:
     """
     tracks = found.by_channel
     compass = tracks.pop("psi_magnetic", None)
+    true = tracks.get("psi")
     if compass is None:
         return
-    true = tracks.get("psi")
     if true is not None:
-        counts = [f"{one.source} ({one.t.size} values)" for one in (true, compass)]
         is_true = true.covered >= 0.5 * compass.covered
-        if not is_true:
-            counts.reverse()
+        read, other = (true, compass) if is_true else (compass, true)
         if true.source != compass.source:
-            found.notes.append(f"psi is from {counts[0]}; {counts[1]} left out")
+            found.notes.append(f"psi is from {read.words}; {other.words} left out")
         if is_true:
             return
     tracks["psi"] = compass
     variation = tracks.get("variation")
     found.magnetic = variation is None
-    if variation is None:
-        return
-    added = variation.at(compass.t)
-    tracks["psi"] = compass._replace(values=compass.values + added)
-    middle = float(np.median(added)) / DEGREE
-    found.notes.append(
-        f"psi is the magnetic heading of {compass.source} with the variation of"
-        f" {variation.source} added, {abs(middle):.1f} deg"
-        f" {'E' if middle >= 0.0 else 'W'}"
-    )
+    if variation is not None:
+        added = variation.at(compass.t)
+        tracks["psi"] = compass._replace(values=compass.values + added)
+        middle = float(np.median(added)) / DEGREE
+        found.notes.append(
+            f"psi is the magnetic heading of {compass.source} with the variation of"
+            f" {variation.source} added, {abs(middle):.1f} deg"
+            f" {'E' if middle >= 0.0 else 'W'}"
+        )
 
 
 def wind_over_ground(

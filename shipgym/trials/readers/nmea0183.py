@@ -6,13 +6,12 @@ satellites) are passed over.
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from math import copysign, isfinite, nan
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import pynmea2
+from pynmea2 import NMEASentence
 
 from shipgym.files import shipped_toml
 from shipgym.trials.readers.messages import Heard, Value, port_source
@@ -26,53 +25,54 @@ _TIME = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-5]\d(?:\.\d*)?)")
 #: Names of transducers that show a rudder, and that of the port one.
 _RUDDER = re.compile(r"RUD|RSA|HELM", re.IGNORECASE)
 _PORT_RUDDER = re.compile(r"PORT|[_ ]P$|[_ ]BB$", re.IGNORECASE)
-
-Letters = Mapping[str, str]  # letters of a field, by its place
-
-
-class THS(pynmea2.TalkerSentence):  # type: ignore[misc]
-    """True heading and status, which pynmea2 does not have; it registers itself."""
-
-    fields = (("Heading", "heading"), ("Mode indicator", "mode"))
+_MOST_FIELDS = 20  # that are looked at; those at the end may be missing
 
 
-@dataclass(frozen=True)
-class _Number:
-    """Place of a number in a sentence; `nmea0183.toml` explains the names."""
+class _Number(NamedTuple):
+    """Place of a number in a sentence; `nmea0183.toml` explains the words."""
 
     at: int
-    unit: str = ""
-    unit_at: int | None = None
-    side: int | None = None
-    letters: Letters = field(default_factory=dict)
-    only_if: Letters = field(default_factory=dict)
-    status: Letters = field(default_factory=dict)
+    unit: str
+    side: int | None
+    letters: dict[int, str]  # with which it counts, by place
+    required: set[int]  # places that must have one
+
+    def counts(self, fields: Sequence[str]) -> bool:
+        """Return whether the letters beside a number say that it counts."""
+        return all(
+            fields[at] in (*letters,) or not (fields[at] or at in self.required)
+            for at, letters in self.letters.items()
+        )
 
 
-@dataclass(frozen=True)
-class _Kind:
-    """Contents of a kind of sentence."""
+def _number_at(text: str) -> _Number:
+    at, unit, *words = text.split()
+    side = None
+    if words and words[0].isdigit():
+        side = int(words[0])
+        words[0] += ":NSEW"
+    letters = {int(at): allowed for at, _, allowed in map(_parted, words)}
+    required = {int(at) for at, sign, _ in map(_parted, words) if sign == ":"}
+    return _Number(int(at), unit, side, letters, required)
 
-    numbers: Mapping[str, _Number]  # by channel
-    time: int | None = None
-    date: int | None = None
-    day: int | None = None
 
-
-def _kind(entry: dict[str, Any]) -> _Kind:
-    status = entry.pop("status", {})
-    places = {name: entry.pop(name, None) for name in ("time", "date", "day")}
-    numbers = {}
-    for channel, number in entry.items():
-        numbers[channel] = _Number(**{"status": status, **number})
-    return _Kind(numbers, **places)
+def _parted(word: str) -> list[str]:
+    return re.split("([=:])", word)
 
 
 _TABLE = shipped_toml("shipgym.trials.readers", "nmea0183.toml")
-_KINDS = {name: _kind(entry) for name, entry in _TABLE.items()}
+#: Numbers of each kind of sentence by channel.
+_NUMBERS: dict[str, dict[str, _Number]] = {
+    kind: {
+        channel: _number_at(f"{text} {entry.get('status', '')}")
+        for channel, text in entry.items()
+        if channel not in ("status", "time", "date", "day")
+    }
+    for kind, entry in _TABLE.items()
+}
 _SENTENCE = re.compile(
-    rf"\$[A-Za-z0-9]{{2}}(?:{'|'.join(_KINDS)}|XDR),[^$!\\\"\r\n*]*"
-    r"(?:\*[^,;\s\"$!\\]{0,2})?"
+    rf"\$([A-Za-z0-9]{{2}}(?:{'|'.join(_TABLE)}|XDR),[^$!\\\"\r\n*]*)"
+    r"(\*[^,;\s\"$!\\]{0,2})?"
 )
 
 
@@ -80,8 +80,18 @@ class _Found(NamedTuple):
     """A sentence as it stands in a log."""
 
     line: int
-    source: str  # talker and kind
     text: str
+    checksum: str  # behind a star; empty without one
+
+    @property
+    def source(self) -> str:
+        """Talker and kind."""
+        return self.text[:5]
+
+    @property
+    def shape(self) -> tuple[bool, int]:
+        """Whether it has a checksum, and its number of commas."""
+        return bool(self.checksum), self.text.count(",")
 
 
 def hear_sentences(lines: Sequence[str], heard: Heard) -> None:
@@ -91,31 +101,33 @@ def hear_sentences(lines: Sequence[str], heard: Heard) -> None:
     another number of fields.
     """
     found = _find(lines, heard)
-    with_checksum = _usual(found, "*")
-    commas = _usual(found, ",")
+    shapes: dict[str, Counter[tuple[bool, int]]] = {}
+    for one in found:
+        shapes.setdefault(one.source, Counter())[one.shape] += 1
+    usual = {source: shape.most_common(1)[0][0] for source, shape in shapes.items()}
     lacking = 0
     without_status: list[str] = []
-    for line, source, text in found:
-        may_lack = with_checksum[source] == 0
-        lacks = "*" not in text
+    for one in found:
+        fields = one.text.split(",")[1:]
         try:
-            if lacks and not (may_lack and text.count(",") == commas[source]):
+            if not one.checksum and one.shape != usual[one.source]:
                 raise ValueError("expected a checksum, or as many fields as usual")
-            sentence = pynmea2.parse(text)
-            numbers, lacks_status = _numbers(sentence)
-            time = _time(sentence)
+            summed = NMEASentence.checksum(one.text)
+            if one.checksum and int(one.checksum[1:], 16) != summed:
+                raise ValueError("expected another checksum")
+            numbers, lacks_status = _numbers(one.source[2:], fields)
+            time = _time(one.source[2:], fields)
         except ValueError:
             heard.count += 1
-            heard.damaged.append(line)
+            heard.damaged.append(one.line)
             continue
         port = numbers.pop("port", None)
-        heard.hear(line, source, _channel_values(numbers), time)
+        heard.hear(one.line, one.source, numbers, time)
         if port is not None:
-            second = heard.channels["delta"][port_source(source)]
-            second.append(Value(line, time, port))
-        lacking += lacks
-        if lacks_status:
-            without_status.append(source)
+            second = heard.channels["delta"][port_source(one.source)]
+            second.append(Value(one.line, time, port))
+        lacking += not one.checksum
+        without_status += [one.source] * lacks_status
     if lacking:
         heard.notes.append(
             f"{lacking} of {len(found)} sentences have no checksum: nothing protects"
@@ -135,76 +147,62 @@ def _find(lines: Sequence[str], heard: Heard) -> list[_Found]:
     for number, line in enumerate(lines, start=1):
         if "$" not in line:
             continue
-        matches = list(_SENTENCE.finditer(line))
+        matches = [*_SENTENCE.finditer(line)]
         for match in matches:
-            text = match[0].rstrip()
-            found.append(_Found(number, text[1:6], text))
+            one = _Found(number, match[1], match[2] or "")
+            found.append(one)
         if matches:
-            before, after = line[: matches[0].start()], line[matches[-1].end() :]
+            before = line[: matches[0].start()]
+            after = line[matches[-1].end() :]
             heard.stamp(number, before or after)
     return found
 
 
-def _usual(found: Sequence[_Found], sign: str) -> dict[str, int]:
-    """How often most sentences of a source have a sign, by source."""
-    counts: dict[str, Counter[int]] = {}
-    for _, source, text in found:
-        counts.setdefault(source, Counter())[text.count(sign)] += 1
-    return {source: count.most_common(1)[0][0] for source, count in counts.items()}
-
-
-def _numbers(sentence: Any) -> tuple[dict[str, float], bool]:
+def _numbers(kind: str, given: Sequence[str]) -> tuple[dict[str, float], bool]:
     """Numbers of a sentence by channel, and whether one of them has an empty status.
 
     In SI units, positions in degrees. Raises ValueError where one is broken.
     """
-    if sentence.sentence_type == "XDR":
-        return _transducer_values(sentence.data), False
-    fields = [*sentence.data, *[""] * 20]  # those at the end may be missing
+    if kind == "XDR":
+        return _transducers(given), False
+    fields = [field.strip() for field in (*given, *[""] * _MOST_FIELDS)]
     numbers = {}
     lacks_status = False
-    for channel, place in _KINDS[sentence.sentence_type].numbers.items():
-        text = fields[place.at]
-        if not text or not _counts(place, fields):
-            continue
-        numbers[channel] = _number(text, place, fields)
-        lacks_status |= any(not fields[int(at)] for at in place.status)
+    for channel, place in _NUMBERS[kind].items():
+        if fields[place.at] and place.counts(fields):
+            numbers[channel] = _number(fields, place)
+            lacks_status |= any(
+                not fields[at] and letters.startswith("A")
+                for at, letters in place.letters.items()
+            )
+    # a heading by compass with its deviation, and true if the variation is known
+    deviation = numbers.pop("deviation", 0.0)
+    if "psi_magnetic" in numbers:
+        numbers["psi_magnetic"] += deviation
+        if "variation" in numbers:
+            magnetic = numbers.pop("psi_magnetic")
+            numbers.setdefault("psi", magnetic + numbers["variation"])
     return numbers, lacks_status
 
 
-def _counts(place: _Number, fields: Sequence[str]) -> bool:
-    """Return whether the letters beside a number say that it counts."""
-    sides = {} if place.side is None else {str(place.side): "NSEW"}
-    for at, letters in {**place.only_if, **sides}.items():
-        if len(fields[int(at)]) != 1 or fields[int(at)] not in letters:
-            return False
-    return all(
-        fields[int(at)] in ("", *letters)
-        for at, letters in (*place.status.items(), *place.letters.items())
-    )
-
-
-def _number(text: str, place: _Number, fields: Sequence[str]) -> float:
+def _number(fields: Sequence[str], place: _Number) -> float:
+    text, unit = fields[place.at], place.unit
     value = float(text)
     if not isfinite(value):
         raise ValueError(f"expected a finite number, got {text}")
-    if place.unit == "ddmm.mm":  # 5430.5 is 54 degrees and 30.5 minutes
+    if unit == "ddmm.mm":  # 5430.5 is 54 degrees and 30.5 minutes
         degrees, minutes = divmod(value, 100.0)
         if not minutes < 60.0 or value < 0.0:
             raise ValueError(f"expected degrees and minutes below 60, got {text}")
         value = degrees + minutes / 60.0
     else:
-        unit = place.unit
-        if place.unit_at is not None:
-            unit = _SPEED_UNITS[fields[place.unit_at]]
+        if unit.startswith("@"):
+            unit = _SPEED_UNITS[fields[int(unit[1:])]]
         value *= _FACTORS[unit]
-    if place.side is None:
-        return value
-    side = fields[place.side]
-    return copysign(value, _SIGNS[side])
+    return value if place.side is None else copysign(value, _SIGNS[fields[place.side]])
 
 
-def _transducer_values(fields: Sequence[str]) -> dict[str, float]:
+def _transducers(fields: Sequence[str]) -> dict[str, float]:
     """Rudder angles among the transducers of a sentence, rad.
 
     Each has four fields: type (A: an angle), value, unit (D: degrees) and name.
@@ -212,44 +210,27 @@ def _transducer_values(fields: Sequence[str]) -> dict[str, float]:
     values = {}
     for at in range(0, len(fields) - 3, 4):
         kind, value, unit, name = fields[at : at + 4]
-        is_angle = kind == "A" and unit in ("D", "")
-        if is_angle and value and _RUDDER.search(name):
+        if kind == "A" and unit in ("D", "") and value and _RUDDER.search(name):
             channel = "port" if _PORT_RUDDER.search(name) else "delta"
             values[channel] = DEGREE * float(value)
     return values
 
 
-def _time(sentence: Any) -> float:
+def _time(kind: str, given: Sequence[str]) -> float:
     """Seconds since 1970 with a date, else of the day; nan without a time."""
-    kind = _KINDS.get(sentence.sentence_type)
-    if kind is None or kind.time is None:
-        return nan
-    fields = [*sentence.data, *[""] * 20]
-    match = _TIME.fullmatch(fields[kind.time])
+    places = _TABLE.get(kind, {})
+    fields = [*given, *[""] * _MOST_FIELDS]
+    match = _TIME.fullmatch(fields[places["time"]]) if "time" in places else None
     if match is None:
         return nan
     hours, minutes, seconds = map(float, match.groups())
     of_day = 3600.0 * hours + 60.0 * minutes + seconds
-
     date, form = "", "%d%m%y"
-    if kind.date is not None:
-        date = fields[kind.date]
-    if kind.day is not None:
-        date = "-".join(fields[kind.day : kind.day + 3]).strip("-")
+    if "date" in places:
+        date = fields[places["date"]]
+    if "day" in places:
+        date = "-".join(fields[places["day"] :][:3]).strip("-")
         form = "%d-%m-%Y"
     if not date:
         return of_day
-    midnight = datetime.strptime(date, form).replace(tzinfo=UTC)
-    return midnight.timestamp() + of_day
-
-
-def _channel_values(numbers: dict[str, float]) -> dict[str, float]:
-    """Values by channel: a heading by compass with its deviation, and true if known."""
-    values = dict(numbers)
-    deviation = values.pop("deviation", 0.0)
-    if "psi_magnetic" in values:
-        values["psi_magnetic"] += deviation
-    if {"psi_magnetic", "variation"} <= values.keys():
-        magnetic = values.pop("psi_magnetic")
-        values.setdefault("psi", magnetic + values["variation"])
-    return values
+    return datetime.strptime(date, form).replace(tzinfo=UTC).timestamp() + of_day

@@ -17,6 +17,7 @@ from shipgym.trials.readers.line_stamps import read_stamps, stamp_text
 from shipgym.trials.readers.messages import Heard, port_source
 from shipgym.trials.units import DEGREE, KNOT
 
+_FACTORS = {"deg": DEGREE, "deg/s": DEGREE, "kn": KNOT, "kts": KNOT, "km/h": 1.0 / 3.6}
 _PGNS: dict[str, dict[str, str]] = shipped_toml("shipgym.trials", "nmea2000.toml")
 #: A message in a line: canboat's text, JSON and plain form, and frames by candump (with
 #: # or a length in brackets), by gateways of Yacht Devices and by Actisense (sender,
@@ -46,32 +47,24 @@ _FORMS = [
 ]
 
 
-class _Field(NamedTuple):
-    """A field of a message as it is written."""
-
-    value: Any
-    unit: str  # empty where it is not said
-
-
 class _Message(NamedTuple):
-    """A message of a line: its PGN, the address of its sender, its fields by name."""
+    """A message of a line: its PGN, the address of its sender, its fields by name.
+
+    The names are in lower case, without blanks; a field is a value and its unit, empty
+    where it is not said.
+    """
 
     line: int
     pgn: str
     sender: str
-    fields: Mapping[str, _Field]  # in lower case, without blanks
+    fields: Mapping[str, tuple[Any, str]]
+
+    def value(self, name: str) -> Any:
+        """A field without its unit; None for none."""
+        return self.fields.get(name, (None, ""))[0]
 
 
 _Decode = Callable[[str], Any]  # a line in canboat's plain form
-
-
-def find_message(line: str) -> re.Match[str] | None:
-    """Find a message of NMEA 2000 in a line, in any form; None where there is none."""
-    for form in _FORMS:
-        match = form.search(line)
-        if match is not None:
-            return match
-    return None
 
 
 def hear_pgns(lines: Sequence[str], heard: Heard) -> None:
@@ -84,106 +77,94 @@ def hear_pgns(lines: Sequence[str], heard: Heard) -> None:
     for number, line in enumerate(lines, start=1):
         if "$" in line or '"updates"' in line:
             continue
-        match = find_message(line)
+        match = next(filter(None, (form.search(line) for form in _FORMS)), None)
         if match is None:
             continue
         found = match.groupdict()
         if "data" in found and decode is None:
-            decode = _decoder()
+            module = library(
+                "nmea2000.decoder", "nmea2000", "which decodes raw NMEA 2000"
+            )
+            decode = module.NMEA2000Decoder(units="si").decode
         try:
             message, stamp = _parsed(number, found, decode)
         except (ValueError, KeyError):
             heard.count += 1
             heard.damaged.append(number)
             continue
-        if message is not None:
+        if message.pgn in _PGNS and message.fields:
             messages.append(message)
-            before = line[: match.start()]
-            heard.stamp(number, f"{before} {stamp}")
-    _hear(messages, heard)
+            heard.stamp(number, f"{line[: match.start()]} {stamp}")
 
-
-def _decoder() -> _Decode:
-    module = library("nmea2000.decoder", "nmea2000", "which decodes raw NMEA 2000")
-    decode: _Decode = module.NMEA2000Decoder(units="si").decode
-    return decode
+    unit = _angle_unit(messages)
+    if unit == "rad":
+        heard.notes.append(
+            "angles of NMEA 2000 are in rad: none of heading and course exceeds 2 pi"
+        )
+    for message in messages:
+        source = f"PGN {message.pgn} of {message.sender}"
+        if message.pgn == "127245" and _number(message.value("instance")) == 1.0:
+            source = port_source(source)
+        heard.hear(message.line, source, _channels(message, unit), _time(message))
 
 
 def _parsed(
     number: int, found: Mapping[str, str], decode: _Decode | None
-) -> tuple[_Message | None, str]:
-    """The message that a line holds, and its time; None for one of no use."""
+) -> tuple[_Message, str]:
+    """The message that a line holds, and its time."""
+    fields: dict[str, tuple[Any, str]] = {}
     if "json" in found:
         content = json.loads(found["json"])
-        fields = {}
         for name, value in content["fields"].items():
-            plain = value["name"] if isinstance(value, dict) else value
-            fields[_plain(name)] = _Field(plain, unit="")
-        pgn, sender = str(content["pgn"]), str(content.get("src", ""))
+            plain_value = value["name"] if isinstance(value, dict) else value
+            fields[name] = (plain_value, "")
+        pgn = str(content["pgn"])
+        sender = str(content.get("src", ""))
         stamp = str(content.get("timestamp", ""))
-    elif "fields" in found:
-        pgn, sender, stamp = found["pgn"], found["sender"], found["stamp"]
-        fields = _fields_of_text(found["fields"])
     else:
         pgn, sender = _address(found)
         stamp = found["stamp"] or ""
-        fields = {}
-        if pgn in _PGNS and decode is not None:
+        if "fields" in found:
+            fields = _fields_of_text(found["fields"])
+        elif pgn in _PGNS and decode is not None:
             fields = _decoded(pgn, sender, found["data"], decode)
-    if pgn not in _PGNS or not fields:
-        return None, stamp
-    return _Message(number, pgn, sender, fields), stamp
+    plain = {name.replace(" ", "").lower(): field for name, field in fields.items()}
+    return _Message(number, pgn, sender, plain), stamp
 
 
-def _plain(name: str) -> str:
-    return name.replace(" ", "").lower()
-
-
-def _fields_of_text(text: str) -> dict[str, _Field]:
+def _fields_of_text(text: str) -> dict[str, tuple[Any, str]]:
     """Fields of ``SID = 125; Rate = 0.0934 deg/s``."""
-    fields = {}
+    fields: dict[str, tuple[Any, str]] = {}
     for field in text.split(";"):
         name, _, written = field.partition("=")
-        words = written.split()
-        if not words:
-            continue
-        if _number(words[0]) is None:
-            fields[_plain(name)] = _Field(" ".join(words), unit="")
-        else:
-            unit = words[1] if len(words) > 1 else ""
-            fields[_plain(name)] = _Field(words[0], unit)
+        bare = written.strip()
+        value, _, unit = bare.partition(" ")
+        if _number(value) is None:
+            value = bare
+            unit = ""
+        fields[name] = (value, unit)
     return fields
 
 
 def _address(found: Mapping[str, str]) -> tuple[str, str]:
-    """PGN and sender of a raw frame."""
+    """PGN and sender of a message that is no JSON."""
     if "pgn" in found:
         return found["pgn"], found["sender"]
     if "can_id" in found:
         can_id = int(found["can_id"], 16)
-        pgn = can_id >> 8 & 0x3FFFF
-        sender = can_id & 0xFF
-    else:
-        pgn = int(found["hex_pgn"], 16)
-        sender = int(found["hex_sender"], 16)
-    return str(pgn), str(sender)
+        return str(can_id >> 8 & 0x3FFFF), str(can_id & 0xFF)
+    return str(int(found["hex_pgn"], 16)), str(int(found["hex_sender"], 16))
 
 
-def _decoded(pgn: str, sender: str, data: str, decode: _Decode) -> dict[str, _Field]:
+def _decoded(
+    pgn: str, sender: str, data: str, decode: _Decode
+) -> dict[str, tuple[Any, str]]:
     """Fields of a raw frame; empty until all frames of a longer message are there."""
-    digits = re.sub("[ ,]", "", data)
-    octets = [digits[at : at + 2] for at in range(0, len(digits), 2)]
-    count = len(octets)
-    bytes_of_data = ",".join(octets)
-    line = f"2000-01-01T00:00:00.000Z,2,{pgn},{sender},255,{count},{bytes_of_data}"
-    decoded = decode(line)
-    if decoded is None:
-        return {}
-    fields = {}
-    for field in decoded.fields:
-        unit = field.unit_of_measurement or "SI"
-        fields[_plain(field.name)] = _Field(field.value, unit)
-    return fields
+    octets = re.findall("..", re.sub("[ ,]", "", data))
+    head = f"2000-01-01T00:00:00.000Z,2,{pgn},{sender},255,{len(octets)}"
+    decoded = decode(",".join([head, *octets]))
+    fields = [] if decoded is None else decoded.fields
+    return {one.name: (one.value, one.unit_of_measurement or "SI") for one in fields}
 
 
 def _number(text: Any) -> float | None:
@@ -195,66 +176,29 @@ def _number(text: Any) -> float | None:
     return number if np.isfinite(number) else None
 
 
-def _hear(messages: Sequence[_Message], heard: Heard) -> None:
-    """Add the channels of messages, whose angles are degrees where no unit says so."""
-    unit = _angle_unit(messages)
-    if unit == "rad":
-        heard.notes.append(
-            "angles of NMEA 2000 are in rad: none of heading and course exceeds 2 pi"
-        )
-    for message in messages:
-        numbers = {}
-        for name, channel in _PGNS[message.pgn].items():
-            value = _si_value(message.fields.get(name), channel, unit)
-            if value is not None:
-                numbers[channel] = value
-        values = _channel_values(message, numbers)
-        source = f"PGN {message.pgn} of {message.sender}"
-        instance = message.fields.get("instance")
-        is_second = instance is not None and _number(instance.value) == 1.0
-        if message.pgn == "127245" and is_second:
-            source = port_source(source)
-        heard.hear(message.line, source, values, _time(message))
-
-
 def _angle_unit(messages: Iterable[_Message]) -> str:
     """Unit of angles without one: rad where headings and courses are that small."""
-    largest = 0.0
-    for message in messages:
-        for name in ("heading", "cog"):
-            field = message.fields.get(name)
-            value = None if field is None or field.unit else _number(field.value)
-            largest = max(largest, value or 0.0)
-    return "rad" if 0.0 < largest < 6.3 else "deg"
+    without_unit = [
+        _number(value) or 0.0
+        for message in messages
+        for name, (value, unit) in message.fields.items()
+        if name in ("heading", "cog") and not unit
+    ]
+    return "rad" if 0.0 < max(without_unit, default=0.0) < 6.3 else "deg"
 
 
-def _si_value(field: _Field | None, channel: str, angle_unit: str) -> float | None:
-    """A field in SI units, a position in degrees; None where it has no value."""
-    if field is None:
-        return None
-    value = _number(field.value)
-    if value is None or channel in ("lat", "lon"):
-        return value
-    usual_unit = angle_unit
-    if channel in ("sog", "stw", "speed"):
-        usual_unit = "m/s"
-    factors = {
-        "deg": DEGREE,
-        "deg/s": DEGREE,
-        "kn": KNOT,
-        "kts": KNOT,
-        "km/h": 1.0 / 3.6,
-    }
-    unit = field.unit or usual_unit
-    return value * factors.get(unit, 1.0)
-
-
-def _channel_values(message: _Message, numbers: dict[str, float]) -> dict[str, float]:
-    """Channels of a message: headings and winds by the reference that it names."""
-    values = dict(numbers)
-    fields = message.fields
-    none = _Field("", unit="")
-    reference = fields.get("reference", none).value
+def _channels(message: _Message, angle_unit: str) -> dict[str, float]:
+    """Channels of a message, SI units; headings and winds by the reference it names."""
+    values = {}
+    for name, channel in _PGNS[message.pgn].items():
+        value, unit = message.fields.get(name, (None, ""))
+        number = _number(value)
+        if number is not None:
+            is_angle = channel not in ("sog", "stw", "speed", "lat", "lon")
+            unit = unit or (angle_unit if is_angle else "m/s")
+            is_si = channel in ("lat", "lon")
+            values[channel] = number * (1.0 if is_si else _FACTORS.get(unit, 1.0))
+    reference = message.value("reference")
     heading = values.pop("heading", None)
     deviation = values.pop("deviation", 0.0)
     if heading is not None and reference == "True":
@@ -262,28 +206,18 @@ def _channel_values(message: _Message, numbers: dict[str, float]) -> dict[str, f
     elif heading is not None:
         values["psi_magnetic"] = heading + deviation
 
-    course_reference = fields.get("cogreference", none).value
-    if course_reference == "Magnetic":
-        values.pop("cog", None)
-        values.pop("sog", None)
-
-    angle = values.pop("angle", None)
-    speed = values.pop("speed", None)
+    angle, speed = values.pop("angle", None), values.pop("speed", None)
     winds = {"Apparent": "apparent_wind", "True (boat referenced)": "wind"}
-    wind = winds.get(reference)
-    if angle is not None and speed is not None and wind:
-        values[f"{wind}_angle"] = angle
-        values[f"{wind}_speed"] = speed
+    if angle is not None and speed is not None and reference in winds:
+        wind = winds[reference]
+        values |= {f"{wind}_angle": angle, f"{wind}_speed": speed}
+    if message.value("cogreference") == "Magnetic":
+        return {}
     return values
 
 
 def _time(message: _Message) -> float:
     """Seconds since 1970 of a message with date and time; nan for others."""
-    fields = message.fields
-    if not {"date", "time"} <= fields.keys():
-        return np.nan
-    date = str(fields["date"].value).replace(".", "-")
-    text = stamp_text(f"{date} {fields['time'].value}")
-    if not text.startswith(date):
-        return np.nan
-    return float(read_stamps([text])[0])
+    date = str(message.value("date")).replace(".", "-")
+    text = stamp_text(f"{date} {message.value('time')}")
+    return float(read_stamps([text])[0]) if text.startswith(date) else np.nan

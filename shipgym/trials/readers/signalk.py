@@ -38,83 +38,72 @@ def hear_deltas(lines: Sequence[str], heard: Heard) -> None:
         heard.stamp(number, line[: line.index("{")])
         try:
             deltas[number] = _delta(line)
-        except ValueError:
+        except (ValueError, TypeError, AttributeError, KeyError):
             heard.count += 1
             heard.damaged.append(number)
 
     own = _own_context(lines, deltas.values())
     others = 0
     for number, delta in deltas.items():
-        if delta.get("context", own) != own:
+        if delta.get("context", own) == own:
+            _hear(number, delta, heard)
+        else:
             others += 1
-            continue
-        for update in delta["updates"]:
-            _hear(number, update, heard)
     if others:
         heard.notes.append(f"{others} deltas of other vessels than {own} left out")
 
 
 def _delta(line: str) -> dict[str, Any]:
-    """The object in a line; ValueError for another one than a delta.
-
-    A recorder of OpenCPN writes it as a cell, its quotes doubled.
-    """
-    begin = line.index("{")
-    end = line.rindex("}") + 1
-    text = line[begin:end]
-    if '""updates""' in text:
-        text = text.replace('""', '"')
-
-    delta = json.loads(text)
-    updates = delta.get("updates") if isinstance(delta, dict) else None
-    if not isinstance(updates, list):
-        beginning = text[:40]
-        raise ValueError(f"expected a delta, got {beginning!r}")
-    return dict(delta)
+    """The object in a line, of which the values can be read."""
+    # a recorder of OpenCPN writes it as a cell, its quotes doubled
+    text = line.replace('""', '"') if '""updates""' in line else line
+    begin = text.index("{")
+    end = text.rindex("}") + 1
+    delta: dict[str, Any] = json.loads(text[begin:end])
+    list(_values(delta))
+    return delta
 
 
 def _own_context(lines: Sequence[str], deltas: Any) -> str:
     """The vessel that logs: as the server says, or whose data are the most."""
     for line in lines[:10]:
         if '"self"' in line and '"updates"' not in line:
-            hello = json.loads(line[line.index("{") :])
-            return str(hello["self"])
+            return str(json.loads(line[line.index("{") :])["self"])
     counts = Counter[str]()
     for delta in deltas:
-        context = delta.get("context", "vessels.self")
-        if context == "vessels.self":
-            return "vessels.self"
-        paths = {value["path"] for value in _values(delta["updates"])}
-        own = {"steering.rudderAngle", "navigation.headingTrue"}
-        counts[context] += 1 + 1000 * len(paths & own)
-    ((most, _),) = counts.most_common(1) or [("vessels.self", 0)]
-    return most
+        paths = {path for path, *_ in _values(delta)}
+        is_own = paths & {"steering.rudderAngle", "navigation.headingTrue"}
+        counts[delta.get("context", "vessels.self")] += 1 + 1000 * len(is_own)
+    if not counts or "vessels.self" in counts:
+        return "vessels.self"
+    return max(counts, key=counts.__getitem__)
 
 
-def _values(updates: Sequence[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:
-    for update in updates:
+def _values(delta: Mapping[str, Any]) -> Iterator[tuple[str, Any, Mapping[str, Any]]]:
+    """Path, content and update of each value."""
+    for update in delta["updates"]:
         for value in update.get("values", []):
-            if isinstance(value, dict) and "path" in value:
-                yield value
+            if "path" in value:
+                yield value["path"], value.get("value"), update
 
 
-def _hear(line: int, update: Mapping[str, Any], heard: Heard) -> None:
-    """Add the channels of an update, each path a source of its own."""
-    time = _time(update.get("timestamp"))
-    sender = _sender(update)
-    for value in _values([update]):
-        path, content = value["path"], value.get("value")
+def _hear(line: int, delta: Mapping[str, Any], heard: Heard) -> None:
+    """Add the channels of a delta, each path a source of its own."""
+    for path, content, update in _values(delta):
         if path == "navigation.position" and isinstance(content, dict):
-            numbers = {
-                "lat": _number(content.get("latitude")),
-                "lon": _number(content.get("longitude")),
+            numbers: dict[str, Any] = {
+                "lat": content.get("latitude"),
+                "lon": content.get("longitude"),
             }
         elif path in _PATHS:
-            numbers = {_PATHS[path]: _number(content)}
+            numbers = {_PATHS[path]: content}
         else:
             continue
-        if np.isfinite([*numbers.values()]).all():
-            heard.hear(line, f"{path} of {sender}", numbers, time)
+        if all(
+            type(one) in (int, float) and np.isfinite(one) for one in numbers.values()
+        ):
+            source = f"{path} of {_sender(update)}"
+            heard.hear(line, source, numbers, _time(update.get("timestamp")))
 
 
 def _time(text: Any) -> float:
@@ -123,23 +112,12 @@ def _time(text: Any) -> float:
         moment = datetime.fromisoformat(str(text))
     except ValueError:
         return np.nan
-    if moment.tzinfo is None:
-        moment = moment.replace(tzinfo=UTC)
-    return moment.timestamp()
+    return moment.replace(tzinfo=moment.tzinfo or UTC).timestamp()
 
 
 def _sender(update: Mapping[str, Any]) -> str:
-    if "$source" in update:
-        return str(update["$source"])
-    source = update.get("source")
+    source = update.get("$source", update.get("source"))
     if not isinstance(source, dict):
         return str(source)
     parts = [source.get(key) for key in ("label", "talker", "sentence", "src", "pgn")]
     return ".".join(str(part) for part in parts if part is not None)
-
-
-def _number(value: Any) -> float:
-    """A value as a number; nan for a word or none."""
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return float(value)
-    return np.nan

@@ -67,10 +67,10 @@ def text_lines(path: Path, content: bytes) -> tuple[list[str], str]:
 
 def _decode(path: Path, content: bytes) -> tuple[str, str]:
     """A text and its encoding, empty for UTF-8 and Latin-1."""
-    wide = _utf_16(content)
+    wide = content.startswith((b"\xff\xfe", b"\xfe\xff"))
     try:
         if wide:
-            return content.decode(wide).removeprefix("\ufeff"), "UTF-16"
+            return content.decode("utf-16"), ""
         return content.decode("utf-8-sig"), ""
     except UnicodeDecodeError as error:
         start = error.start
@@ -85,20 +85,6 @@ def _decode(path: Path, content: bytes) -> tuple[str, str]:
         f"{path}: line {line}: expected a text in UTF-8, got byte"
         f" 0x{content[start]:02x} (binary content); save it as text in UTF-8"
     )
-
-
-def _utf_16(content: bytes) -> str:
-    """Encoding of a text in UTF-16, with or without its mark; empty for others."""
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return "utf-16"
-    pairs = len(content[:400]) // 2
-    for encoding, zeros in (
-        ("utf-16-le", content[1:400:2]),
-        ("utf-16-be", content[:400:2][:pairs]),
-    ):
-        if pairs >= 4 and zeros.count(0) == pairs:
-            return encoding
-    return ""
 
 
 def _by_words(content: bytes) -> tuple[str, str] | None:
