@@ -35,8 +35,7 @@ def identification_settings(
     """
     given = {name: value for name, value in given.items() if value is not None}
     table = ship.identify
-    with_kernel = "kernel" in table or "kernel" in given
-    of_file = read_table(table, f"{ship.path}: [identify]", with_kernel)
+    of_file = read_table(table, f"{ship.path}: [identify]")
     # Options that may name a model's file.
     models = ("reference_model", "prior")
     for option in models:
@@ -45,7 +44,7 @@ def identification_settings(
             path = ship.path.parent / model
             of_file[option] = str(path)
 
-    asked = read_table(given, "options", with_kernel)
+    asked = read_table(given, "options")
     chosen = of_file | asked
     _choose_structure(chosen, asked, unnamed, ship)
     return chosen

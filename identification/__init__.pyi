@@ -24,6 +24,7 @@ from .estimators.lssvm import (
 from .estimators.optimisers import ArtificialBeeColony as ArtificialBeeColony
 from .estimators.optimisers import GridSearch as GridSearch
 from .estimators.optimisers import ParticleSwarm as ParticleSwarm
+from .estimators.optimisers import SearchResult as SearchResult
 from .estimators.recursive import (
     MultiInnovationLeastSquares as MultiInnovationLeastSquares,
 )
@@ -34,7 +35,6 @@ from .estimators.recursive import (
     StochasticGradient as StochasticGradient,
 )
 from .estimators.rm_svm import RMSVM as RMSVM
-from .estimators.search import SearchResult as SearchResult
 from .estimators.tuned import TunedLSSVM as TunedLSSVM
 from .judging.uncertainty import Uncertainty as Uncertainty
 from .models.prior_knowledge import PriorKnowledge as PriorKnowledge

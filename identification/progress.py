@@ -25,7 +25,11 @@ def counted(stage: str, items: Sequence[T]) -> Iterator[T]:
     """
     report = PROGRESS.get()
     for done, item in enumerate(items):
-        report(stage, done, len(items))
+        report(
+            stage,
+            done,
+            len(items),
+        )
         token = PROGRESS.set(_ignored)
         try:
             yield item

@@ -17,7 +17,7 @@ from griffe import Docstring, DocstringSectionKind
 
 from identification.models.methods import METHODS, make_method, method_options
 from identification.pipeline.options import STAGES, Options
-from identification.pipeline.reading import ARGUMENTS, WORDS, full_name
+from identification.pipeline.reading import ARGUMENTS, WORDS, option_names
 
 PAGE = Path(__file__).parents[1] / "docs" / "identification.md"
 MARKS = re.compile(r"<!-- options: (.+?) -->\n.*?<!-- end of options -->", re.DOTALL)
@@ -83,7 +83,7 @@ def shown_name(stage: str, name: str) -> str:
     if name == WORDS[stage]:
         return stage
     full = f"{stage}.{name}"
-    is_enough = full_name(name, "options") == full
+    is_enough = option_names()[name] == full
     return name if is_enough else full
 
 

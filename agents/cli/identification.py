@@ -112,12 +112,9 @@ def _check_stable(result: IdentificationResult) -> None:
 @with_identify_options
 def advise_command(
     ship: ShipFileArgument,
-    criterion: Annotated[
-        str,
-        Option(help="What to reduce: c (one coefficient) or D (volume of all)."),
-    ] = "c",
     coefficient: Annotated[
-        str | None, Option(help="For criterion c; default: the least certain.")
+        str | None,
+        Option(help="To make certain; default: what matters most in a hard turn."),
     ] = None,
     number: Annotated[int, Option(min=1, help="Number of manoeuvres.")] = 3,
     *,
@@ -125,20 +122,18 @@ def advise_command(
 ) -> None:
     """Show what the trials determine and what to run next.
 
-    Prints condition number, variance inflation and Fisher information of each trial;
-    then by how much zigzags, turning circles and binary rudder sequences, simulated on
-    the model identified so far, would each reduce what is least certain.
+    Prints by how much zigzags, turning circles and binary rudder sequences, simulated
+    on the model identified so far, would each reduce the error of a coefficient.
     """
     from agents.cli.terminal import answer, identifying, say
     from agents.identifying import identify_ship
-    from identification.design.experiment import advise, check_criterion
+    from identification.design.experiment import advise
 
-    check_criterion(criterion, coefficient)
     read, settings = _chosen(ship, options, "abkowitz")
     with identifying("identifying"):
         result = identify_ship(read, settings)
         used = [trial for trial in result.trials if trial.use == "fit"]
-        advice = advise(result.model, used, None, criterion, coefficient, number)
+        advice = advise(result.model, used, None, coefficient, number)
     answer(advice.to_dict())
     say(str(advice), f"run next: {', then '.join(advice.chosen)}")
 

@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 from shipgym import InputError
 from shipgym.checks import did_you_mean, quoted
-from shipgym.envs.environment import PACE
 from shipgym.envs.registration import registered
 from shipgym.python_files import working_folder
 
@@ -26,8 +25,7 @@ class Environment(NamedTuple):
     name : str
         A short name, or the absolute path of a task's file.
     options : dict
-        Keywords that its id sets, `model` perhaps among them, without the pace of an
-        agent.
+        Keywords that its id sets, `model` perhaps among them.
     """
 
     name: str
@@ -65,8 +63,7 @@ def read_environment(
     module, colon, name = text.rpartition(":")
     if colon:
         _import(module, text, where)
-    registered_options = _registered(name, where).items()
-    options = {key: value for key, value in registered_options if key not in PACE}
+    options = dict(_registered(name, where))
     task = options.pop("task")
     for short_name, shipped_task in SHORT_NAMES.items():
         if task == shipped_task:

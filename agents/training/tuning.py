@@ -61,7 +61,7 @@ def tune(
     settings = plan.settings.changed({"evaluate_every": every})
     plan = replace(plan, settings=settings)
     folder = Path(out)
-    diverged: list[str] = []
+    diverged: list[InputError] = []
 
     def objective(trial: Any) -> float:
         settings = plan.settings
@@ -71,7 +71,7 @@ def tune(
         try:
             return lowest_cost(replace(plan, settings=settings), trial)
         except InputError as error:
-            diverged.append(str(error))
+            diverged.append(error)
             raise
 
     def after(study: Any, trial: Any) -> None:
@@ -89,7 +89,7 @@ def tune(
             callbacks=[after],
         )
         if not _finished(study):
-            raise InputError("; ".join(["every trial diverged", *diverged[-1:]]))
+            raise InputError(f"every trial diverged, the last: {diverged[-1]}")
         return study
 
 

@@ -1,6 +1,6 @@
 """What an agent is compared with, and what a step of a task costs without one."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -15,23 +15,32 @@ from agents.suites.suite import BenchmarkTask
 from shipgym.errors import InputError
 
 
-class OpenLoop:
-    """Commands of shape (n_ships, n_commands) for so many ships, whatever is seen."""
+class ZeroAction:
+    """Commands nothing: the rudder amidships, the shaft stopped."""
 
-    def __init__(self, commands: Callable[[int], Any]) -> None:
-        self.commands = commands
+    def __init__(self, n_commands: int) -> None:
+        self.n_commands = n_commands
+
+    def commands(self, n_ships: int) -> Any:
+        """Return the commands of ships, shape (n_ships, n_commands)."""
+        return np.zeros((n_ships, self.n_commands), dtype=np.float32)
 
     def predict(self, observation: Any, state: Any = None, *_: Any) -> Any:
-        """Command as `Policy.predict`."""
+        """Command as `Policy.predict`, whatever is observed."""
         return self.commands(len(observation)), state
 
 
-def random_actions(n_commands: int) -> OpenLoop:
+class RandomActions(ZeroAction):
     """Commands that are drawn anew in each control interval, evenly from [-1, 1]."""
-    random = np.random.default_rng(0)
-    return OpenLoop(
-        lambda n: random.uniform(-1.0, 1.0, (n, n_commands)).astype(np.float32)
-    )
+
+    def __init__(self, n_commands: int) -> None:
+        super().__init__(n_commands)
+        self.random = np.random.default_rng(0)
+
+    def commands(self, n_ships: int) -> Any:
+        """Return the commands of ships, shape (n_ships, n_commands)."""
+        shape = (n_ships, self.n_commands)
+        return self.random.uniform(-1.0, 1.0, shape).astype(np.float32)
 
 
 def yardsticks(task: BenchmarkTask) -> Mapping[str, Policy]:
@@ -42,8 +51,8 @@ def yardsticks(task: BenchmarkTask) -> Mapping[str, Policy]:
     """
     asked = task.task
     found: dict[str, Policy] = {
-        "zero action": OpenLoop(lambda n: np.zeros((n, asked.n_commands), np.float32)),
-        "random actions": random_actions(asked.n_commands),
+        "zero action": ZeroAction(asked.n_commands),
+        "random actions": RandomActions(asked.n_commands),
     }
     if asked.definition.rule is not None:
         found["rule"] = TaskRule(asked, task.ship)
@@ -63,7 +72,7 @@ def half_reward_cost(task: BenchmarkTask, seeds: ArrayLike) -> float:
     step, so that a task may count in any unit.
     """
     engine = task.engine(len(np.asarray(seeds)))
-    random = random_actions(task.task.n_commands)
+    random = RandomActions(task.task.n_commands)
     run = rollout(random, engine, seeds, record=["cost"])
     median = float(np.median(run.infos["cost"][1:][run.sailing]))
     usual = task.task.definition.half_reward_cost

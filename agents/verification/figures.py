@@ -7,7 +7,7 @@ import numpy as np
 
 from agents.verification.monte_carlo import ManoeuvreUncertainty
 from agents.verification.tracks import Track
-from identification.report.predictions import RUDDER
+from identification.report.figures import RUDDER
 from shipgym.arrays import Floats
 from shipgym.manoeuvres import Criterion
 from shipgym.manoeuvres.quantiles import band_95

@@ -124,10 +124,10 @@ def _changes(trial: Trial, window: float) -> _Changes:
 
 
 def helpful_trial(fit: Fit) -> str:
-    """The trial that shrinks the uncertainty of all coefficients most."""
+    """The trial that shrinks most what is least certain in a hard turn."""
     fitted = [trial for trial in fit.trials if trial.use == "fit"]
     try:
-        advice = advise(fit.model, fitted, criterion="D")
+        advice = advise(fit.model, fitted)
     except InputError:  # a grey box has no table to advise on
         return "a 20/20 zigzag to both sides"
     return f"a {advice.chosen[0]} to both sides"

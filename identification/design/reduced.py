@@ -12,10 +12,9 @@ from identification.design.reduction import (
 from identification.pipeline import identify
 from identification.pipeline.result import IdentificationResult
 from identification.samples.samples import Samples
-from shipgym import InputError, Trial, list_structures, register_structure
+from shipgym import InputError, Trial, register_structure
 from shipgym.arrays import finite
-from shipgym.ships import GreyBox, Structure, get_structure
-from shipgym.ships.structures import GREY_BOX
+from shipgym.ships import GreyBox, Structure
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,12 +61,10 @@ class ReducedIdentification:
 
 def _plain_path(reduction: Reduction) -> list[dict[str, Any]]:
     """The steps of a reduction, infinite errors as null."""
-    path = []
-    for step in reduction.path:
-        fields = asdict(step)
-        errors = step.relative_errors.items()
-        fields["relative_errors"] = {name: finite(error) for name, error in errors}
-        path.append(fields)
+    path = [asdict(step) for step in reduction.path]
+    for step in path:
+        errors = step["relative_errors"]
+        step["relative_errors"] = {name: finite(one) for name, one in errors.items()}
     return path
 
 
@@ -90,9 +87,6 @@ def identify_reduced(
     **arguments
         Of `identify`.
     """
-    asked = arguments.get("structure")
-    if isinstance(asked, str) and asked in list_structures() and asked != GREY_BOX:
-        _check_reducible(get_structure(asked))
     full = identify(trials, **arguments)
     table = full.model.table
     _check_reducible(table)
@@ -125,14 +119,9 @@ def _check_reducible(table: Structure) -> None:
 
 def _name_by_terms(structure: Structure) -> str:
     """The name of a reduced structure, its own among all reductions."""
-    terms = []
-    for q in structure.equations:
-        names = [term.name for term in structure.terms(q)]
-        terms.append((q, names))
-    text = repr(terms)
-    digest = hashlib.sha256(text.encode()).hexdigest()
-    short = digest[:6]
-    return f"{structure.name}-{short}"
+    names = [structure.names(q) for q in structure.equations]
+    digest = hashlib.sha256(repr(names).encode()).hexdigest()
+    return f"{structure.name}-{digest[:6]}"
 
 
 def reduce(
@@ -143,15 +132,10 @@ def reduce(
     Returns the reductions by equation, with the coefficients of the features in SI
     units; the tolerance is that of the held-out R2.
     """
-    reductions = {}
-    for q in structure.equations:
-        reductions[q] = backward_elimination(
-            samples.features[q],
-            samples.targets[q],
-            structure.names(q),
-            tolerance=tolerance,
-        )
-    return reductions
+    return {
+        q: backward_elimination(X, y, structure.names(q), tolerance=tolerance)
+        for q, X, y in samples.by_equation()
+    }
 
 
 def reduced_structure(
@@ -162,24 +146,24 @@ def reduced_structure(
     Register it to identify it. Of forces, sway and yaw, which inertia couples, keep the
     terms that either needs.
     """
-    kept = dict[str, set[str]]()
-    for q in structure.equations:
-        chosen = reductions[q].terms
-        kept[q] = set()
-        for term, label in zip(structure.terms(q), structure.names(q), strict=True):
-            if label in chosen:
-                kept[q].add(term.name)
+    kept = {
+        q: {
+            term.name
+            for term, label in zip(structure.terms(q), structure.names(q), strict=True)
+            if label in reductions[q].terms
+        }
+        for q in structure.equations
+    }
     if structure.quantity == "force" and {"v", "r"} <= kept.keys():
-        either = kept["v"] | kept["r"]
-        kept["v"] = kept["r"] = either
-
-    equations = {}
-    for q, names in kept.items():
-        terms = [term for term in structure.terms(q) if term.name in names]
-        equations[q] = tuple(terms)
+        kept["v"] = kept["r"] = kept["v"] | kept["r"]
+    equations = {
+        q: tuple(term for term in structure.terms(q) if term.name in names)
+        for q, names in kept.items()
+    }
+    source = f"{structure.source}; reduced"
     return replace(
         structure,
         name=name,
-        source=f"{structure.source}; reduced",
+        source=source,
         equations=equations,
     )

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from rich.table import Table
 
-from identification.arrays import by_name, column_rms
+from identification.arrays import by_name, column_rms, mean_square
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.judging.diagnostics import (
     COLLINEAR,
@@ -23,7 +23,6 @@ from identification.judging.diagnostics import (
 from identification.text import as_text
 from shipgym import InputError
 from shipgym.arrays import Floats
-from shipgym.checks import check_number
 
 FOLDS = 5
 
@@ -42,8 +41,6 @@ class ReductionStep:
     #: predicted from the others
     r_squared: float
     held_out: float
-    # share that the change explains of all: negative, for the first model all
-    error_reduction: float
 
 
 @dataclass(frozen=True)
@@ -96,8 +93,8 @@ class _Regression:
     targets: Floats  # shape (n_samples,)
     names: list[str]  # of the terms
 
-    def fitted(self, kept: Sequence[int], changed: str, before: float) -> ReductionStep:
-        """The model of some terms; `before`: the share explained before the change."""
+    def fitted(self, kept: Sequence[int], changed: str) -> ReductionStep:
+        """The model of some terms."""
         # scikit-learn takes a second to import
         from sklearn.model_selection import KFold, cross_val_predict
 
@@ -105,39 +102,26 @@ class _Regression:
         names = tuple(self.names[term] for term in kept)
         estimator = TruncatedLSSVM(selection="full", fit_intercept=False)
         estimator.fit(X, y)
-        predicted = cross_val_predict(estimator, X, y, cv=KFold(FOLDS))
-
-        r_squared = self._explained(X @ estimator.coef_)
+        held_out = cross_val_predict(
+            estimator,
+            X,
+            y,
+            cv=KFold(FOLDS),
+        )
+        with np.errstate(divide="ignore"):  # infinite for a coefficient of 0
+            errors = np.sqrt(np.diag(estimator.covariance_)) / np.abs(estimator.coef_)
         return ReductionStep(
             terms=names,
             changed=changed,
             coefficients=by_name(names, estimator.coef_),
-            relative_errors=by_name(names, _relative_errors(estimator)),
-            r_squared=r_squared,
-            held_out=self._explained(predicted),
-            error_reduction=r_squared - before if changed else r_squared,
+            relative_errors=by_name(names, errors),
+            r_squared=self._explained(X @ estimator.coef_),
+            held_out=self._explained(held_out),
         )
 
     def _explained(self, predicted: Floats) -> float:
         """Share of the targets that a prediction explains."""
-        left = self.targets - predicted
-        power = float(self.targets @ self.targets)
-        unexplained = float(left @ left)
-        return 1.0 - unexplained / power
-
-
-def _relative_errors(estimator: TruncatedLSSVM) -> Floats:
-    """Standard errors of the coefficients by their sizes, infinite for one of 0."""
-    variances = np.diag(estimator.covariance_)
-    size = np.abs(estimator.coef_)
-    errors = np.full(len(size), np.inf)
-    np.divide(
-        np.sqrt(variances),
-        size,
-        out=errors,
-        where=size > 0.0,
-    )
-    return errors
+        return 1.0 - mean_square(self.targets - predicted) / mean_square(self.targets)
 
 
 def backward_elimination(
@@ -171,57 +155,33 @@ def backward_elimination(
         same, it decides.
     """
     regression = _checked(X, y, names)
-    check_number(tolerance, "tolerance", at_least=0.0)
-    check_number(threshold, "threshold", at_least=0.0)
     kept = list(range(len(regression.names)))
-    path = [regression.fitted(kept, "", 0.0)]
+    path = [regression.fitted(kept, "")]
     best = path[0].held_out
-    while len(kept) > 1:
-        step = _without_one(
-            regression,
-            kept,
-            path[-1],
-            threshold=threshold,
-            prefer=prefer,
-            least=best - tolerance,
-        )
-        if step is None:
-            break
+
+    def order(term: int) -> tuple[bool, float, int]:
+        name = regression.names[term]
+        # rounded, so that of two terms that say the same every computer drops the first
+        error = float(f"{path[-1].relative_errors[name]:.6g}")
+        return name in prefer, -error, term
+
+    def without_one() -> ReductionStep | None:
+        """The first model without one term that explains enough; None for none."""
+        errors = path[-1].relative_errors
+        uncertain = {k for k in kept if errors[regression.names[k]] > threshold}
+        candidates = uncertain | collinear_terms(regression.features, kept)
+        for term in sorted(candidates, key=order):
+            fewer = [other for other in kept if other != term]
+            step = regression.fitted(fewer, regression.names[term])
+            if step.held_out >= best - tolerance:
+                return step
+        return None
+
+    while len(kept) > 1 and (step := without_one()) is not None:
         path.append(step)
         kept.remove(regression.names.index(step.changed))
         best = max(best, step.held_out)
     return Reduction(tuple(path), chosen=len(path) - 1)
-
-
-def _without_one(
-    regression: _Regression,
-    kept: Sequence[int],
-    last: ReductionStep,
-    threshold: float,
-    prefer: Sequence[str],
-    least: float,
-) -> ReductionStep | None:
-    """The first model without one term that explains at least as much; None for none.
-
-    Compared is the share explained of what is held out, with the `least` one.
-    """
-    names = regression.names
-    errors = last.relative_errors
-    uncertain = {term for term in kept if errors[names[term]] > threshold}
-    candidates = uncertain | collinear_terms(regression.features, kept)
-
-    def order(term: int) -> tuple[bool, float, int]:
-        name = names[term]
-        # rounded, so that of two terms that say the same every computer drops the first
-        error = float(f"{errors[name]:.6g}")
-        return name in prefer, -error, term
-
-    for term in sorted(candidates, key=order):
-        fewer = [other for other in kept if other != term]
-        step = regression.fitted(fewer, names[term], last.r_squared)
-        if step.held_out >= least:
-            return step
-    return None
 
 
 def collinear_terms(features: Floats, kept: Sequence[int]) -> set[int]:
@@ -241,27 +201,18 @@ def collinear_terms(features: Floats, kept: Sequence[int]) -> set[int]:
 
 def _checked(X: ArrayLike, y: ArrayLike, names: Sequence[str]) -> _Regression:
     """The regression; InputError for wrong shapes and samples that say nothing."""
-    features = np.asarray(X, dtype=float)
+    features = np.asarray(
+        X,
+        dtype=float,
+    )
     targets = np.asarray(y, dtype=float)
     labels = list(names)
-    if features.ndim != 2 or (len(targets), len(labels)) != features.shape:
-        raise InputError(
-            "X, y, names: expected the shapes (n_samples, n_terms) and (n_samples,)"
-            f" and one name a term, got {features.shape}, {targets.shape} and"
-            f" {len(labels)} names"
-        )
-    if not (np.isfinite(features).all() and np.isfinite(targets).all()):
-        raise InputError(
-            "X, y: expected numbers, got a value that is not finite; repair the samples"
-            " first"
-        )
     if len(targets) < FOLDS * max(len(labels), 2):
         raise InputError(
             f"X: expected at least {FOLDS} times as many samples as terms, got"
             f" {len(targets)} samples for {len(labels)} terms"
         )
-    excited = np.append(features.any(axis=0), targets.any())
-    for name, moves in zip((*labels, "y"), excited, strict=True):
-        if not moves:
+    for name, column in zip((*labels, "y"), (*features.T, targets), strict=True):
+        if not column.any():
             raise InputError(f"X, y: expected {name} to be excited, got 0 throughout")
     return _Regression(features, targets, labels)

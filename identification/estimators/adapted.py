@@ -48,14 +48,10 @@ class Adapted(LinearRegressor):
         """Set moment and covariance as of least squares on the features in use."""
         is_used = self.coef_ != 0.0
         used = features[:, is_used]
-        n_features = len(is_used)
-        inverse = np.zeros((n_features, n_features))
-        block = np.ix_(is_used, is_used)
-        inverse[block] = np.linalg.pinv(used.T @ used, hermitian=True)
-
+        inverse = np.zeros((len(is_used), len(is_used)))
+        moment = used.T @ used
+        inverse[np.ix_(is_used, is_used)] = np.linalg.pinv(moment, hermitian=True)
         residuals = targets - features @ self.coef_
-        n_used = int(is_used.sum())
-        freedom = max(len(targets) - n_used, 1)
-        variance = float(residuals @ residuals) / freedom
+        freedom = max(len(targets) - len(moment), 1)
         self.inverse_moment_ = inverse
-        self.covariance_ = variance * inverse
+        self.covariance_ = float(residuals @ residuals) / freedom * inverse

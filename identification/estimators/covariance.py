@@ -14,11 +14,10 @@ from shipgym.trials.resampling import usual_step
 
 def residuals(estimators: Estimators, samples: Samples) -> dict[str, Floats]:
     """Target less prediction of each equation, arrays of shape (n_rows,)."""
-    errors = {}
-    for q, estimator in estimators.items():
-        predicted = estimator.predict(samples.features[q])
-        errors[q] = samples.targets[q] - predicted
-    return errors
+    return {
+        q: samples.targets[q] - estimator.predict(samples.features[q])
+        for q, estimator in estimators.items()
+    }
 
 
 @single_threaded()
@@ -58,16 +57,10 @@ def joint_covariance(
 
 def _without_memory(maps: list[Floats], errors: list[Floats]) -> Floats:
     """Covariance for errors that are independent in time."""
-    rows = []
-    for own_map, own_errors in zip(maps, errors, strict=True):
-        blocks = []
-        for other_map, other_errors in zip(maps, errors, strict=True):
-            n_rows = len(own_errors)
-            moment = (own_errors @ other_errors) / n_rows
-            block = moment * (own_map.T @ other_map)
-            blocks.append(block)
-        rows.append(blocks)
-    return np.block(rows)
+    pairs = list(zip(maps, errors, strict=True))
+    return np.block(
+        [[own @ other / len(own) * (M.T @ N) for N, other in pairs] for M, own in pairs]
+    )
 
 
 def _with_memory(
@@ -77,39 +70,21 @@ def _with_memory(
     memory: float,
 ) -> Floats:
     """Covariance for errors that last, each trial by itself."""
-    by_equation = []
-    for own_map, own_errors in zip(maps, errors, strict=True):
-        moved = own_map * own_errors[:, None]
-        by_equation.append(moved)
-    scores = np.hstack(by_equation)
-
-    n_coefficients = scores.shape[1]
-    total = np.zeros((n_coefficients, n_coefficients))
+    scores = np.hstack([M * own[:, None] for M, own in zip(maps, errors, strict=True)])
+    total = np.zeros((scores.shape[1], scores.shape[1]))
     for trial in np.unique(samples.trial):
         own = samples.trial == trial
-        lags = _lags(memory, samples.start[own])
+        start = samples.start[own]
+        lags = round(memory / usual_step(start)) if len(start) > 1 else 1
         total += newey_west(scores[own], lags)
     return 0.5 * (total + total.T)
 
 
-def _lags(memory: float, start: Floats) -> int:
-    """Rows over which errors of rows that start at some times are correlated."""
-    if len(start) < 2:
-        return 1
-    spacing = usual_step(start)
-    return round(memory / spacing)
-
-
 def effective_freedom(estimator: Estimator, features: Floats) -> float:
     """Samples less effective number of parameters, at least 1."""
-    counts = weights(estimator, features)
-    weighted = features * counts[:, None]
-    moment = features.T @ weighted
-    hat = estimator.inverse_moment_ @ moment
-
-    n_samples = len(features)
-    n_parameters = float(np.trace(hat))
-    return max(n_samples - n_parameters, 1.0)
+    weighted = features * weights(estimator, features)[:, None]
+    n_parameters = np.sum(estimator.inverse_moment_ * (features.T @ weighted).T)
+    return max(len(features) - float(n_parameters), 1.0)
 
 
 def coefficient_covariance(
@@ -133,11 +108,8 @@ def newey_west(scores: Floats, lags: int) -> Floats:
     most = min(lags, len(scores) - 1)
     total: Floats = scores.T @ scores
     for lag in range(1, most + 1):
-        later = scores[lag:]
-        earlier = scores[:-lag]
-        moment = later.T @ earlier
-        weight = 1.0 - lag / (most + 1.0)
-        total += weight * (moment + moment.T)
+        moment = scores[lag:].T @ scores[:-lag]
+        total += (1.0 - lag / (most + 1.0)) * (moment + moment.T)
     return total
 
 
@@ -153,14 +125,10 @@ def without_trials(
     """
     errors = residuals(estimators, samples)
     out = np.isin(samples.trial, trials)
-    found = {}
-    for q, estimator in estimators.items():
-        found[q] = _without_rows(
-            estimator,
-            features=samples.features[q],
-            errors=errors[q],
-            out=out,
-        )
+    found = {
+        q: _without_rows(estimator, samples.features[q], errors[q], out)
+        for q, estimator in estimators.items()
+    }
     return found, samples.select(~out)
 
 

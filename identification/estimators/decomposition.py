@@ -1,20 +1,15 @@
 """One decomposition from which the solutions for every rank and penalty follow.
 
-The samples are reduced once to the triangle R of an orthogonal decomposition of [1 X
-y], which has as many rows as columns whatever the number of samples: residuals have the
-norm of R [b; w; -1]. Its first row holds the means; the rest is the triangle of the
-centred features and targets, of which the singular value decomposition costs nothing.
-Triangles of parts of the data, stacked, have the triangle of the whole. X'X would be as
-small but loses half of the digits.
+X'X would be smaller but loses half of the digits.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from identification.arrays import column_rms
 from identification.estimators.threads import single_threaded
 from shipgym import InputError
 from shipgym.arrays import Floats
@@ -66,88 +61,40 @@ class Decomposition:
         s = self.singular_values
         largest_side = max(self.n_samples, len(self.scale))
         rounding = largest_side * np.finfo(float).eps * s[0]
-        n_above = int(np.sum(s > rounding))
-        return max(n_above, 1)
+        return max(int(np.sum(s > rounding)), 1)
 
-    def filters(self, C: ArrayLike, rank: int) -> Floats:
-        """Factors s / (s^2 + 1/C) of directions, 0 beyond `rank` and below rounding.
-
-        Several C of shape (..., 1) give a row each, shape (..., n_directions).
-        """
+    def filters(self, C: float, rank: int) -> Floats:
+        """Factors s / (s^2 + 1/C) of directions, 0 beyond `rank` and below rounding."""
         s = self.singular_values
-        weight = np.asarray(C, dtype=float)
-        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            penalty = 1.0 / weight
-            factors = s / (s**2 + penalty)
-
-        filters = np.where(s > 0.0, factors, 0.0)
-        kept = min(rank, self.numerical_rank)
-        filters[..., kept:] = 0.0
+        filters = np.zeros(len(s))
+        kept = slice(min(rank, self.numerical_rank))
+        if s[0] > 0.0:
+            filters[kept] = s[kept] / (s[kept] ** 2 + 1.0 / C)
         return filters
 
     def coefficients(self, filters: Floats) -> Floats:
         """Coefficients of the unscaled features, shape (n_features,)."""
-        along = filters * self.projections
-        of_scaled = self.directions.T @ along
+        of_scaled = self.directions.T @ (filters * self.projections)
         return np.asarray(of_scaled / self.scale)
 
     def inverse_moment(self, filters: Floats) -> Floats:
         """Regularised inverse of X'X (X centred), shape (n_features, n_features)."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            inverse = filters / self.singular_values
-        inverse = np.where(filters > 0.0, inverse, 0.0)
-        unscaled = self.directions / self.scale
+        used = filters > 0.0
+        inverse = filters[used] / self.singular_values[used]
+        unscaled = self.directions[used] / self.scale
         return np.asarray((unscaled.T * inverse) @ unscaled)
 
     def unit_covariance(self, filters: Floats) -> Floats:
         """Covariance of the coefficients for noise of unit variance."""
-        of_scaled = self.directions.T * filters
-        root = of_scaled / self.scale[:, None]
+        root = self.directions.T * filters / self.scale[:, None]
         return np.asarray(root @ root.T)
 
     def noise_variance(self, filters: Floats, residuals: Floats) -> float:
         """Variance of the noise by the degrees of freedom; NaN if there are none."""
-        shares = self.singular_values * filters
-        n_effective = float(np.sum(shares))
-        freedom = self.n_free - n_effective
+        freedom = self.n_free - float(self.singular_values @ filters)
         if freedom <= 0.5:
             return np.nan
-        squares = float(residuals @ residuals)
-        return squares / freedom
-
-
-def triangle(
-    X: Floats,
-    y: Floats,
-    fit_intercept: bool,
-    weights: Floats | None = None,
-) -> Floats:
-    """Triangle of an orthogonal decomposition of [1 X y], or [X y] without intercept.
-
-    The weights, shape (n_samples,), are those of the squared errors.
-    """
-    columns = [X, y]
-    if fit_intercept:
-        columns.insert(0, np.ones(len(y)))
-    table = np.column_stack(columns)
-    if weights is not None:
-        table *= np.sqrt(weights)[:, None]
-    return _triangle_of(table)
-
-
-def stacked(triangles: Sequence[Floats]) -> Floats:
-    """Triangle of all data from the triangles of its parts."""
-    return _triangle_of(np.vstack(triangles))
-
-
-def _triangle_of(table: Floats) -> Floats:
-    """Upper triangle of an orthogonal decomposition, filled up to a square by zeros."""
-    with single_threaded():
-        upper = np.linalg.qr(table, mode="r")
-    n_columns = table.shape[1]
-    square = np.zeros((n_columns, n_columns))
-    square[: len(upper)] = upper
-    return square
+        return float(residuals @ residuals) / freedom
 
 
 def decompose(
@@ -157,66 +104,38 @@ def decompose(
     fit_intercept: bool,
     weights: Floats | None = None,
 ) -> Decomposition:
-    """Decompose the features of a regression; arguments as of `LSSVM`, `triangle`."""
-    R = triangle(X, y, fit_intercept, weights)
-    return decompose_triangle(
-        R,
-        n_samples=len(y),
-        scale=scale,
-        fit_intercept=fit_intercept,
-    )
+    """Decompose the features of a regression; arguments as of `LSSVM`.
 
-
-def decompose_triangle(
-    R: Floats,
-    n_samples: int,
-    scale: bool | ArrayLike,
-    fit_intercept: bool,
-) -> Decomposition:
-    """Decompose the features of a regression of which the `triangle` is known."""
-    first = int(fit_intercept)
-    n_features = len(R) - 1 - first
-    centred = R[first:-1, first:-1]
-    targets = R[first:-1, -1]
-    out_of_reach = R[-1, -1]
-    size = _variations(R[:, first:-1], centred, n_samples)
+    The weights, shape (n_samples,), are those of the squared errors.
+    """
+    root = 1.0 if weights is None else np.sqrt(weights)[:, None]
+    centre, mean = np.zeros(X.shape[1]), 0.0
+    if fit_intercept:
+        centre = np.average(X, axis=0, weights=weights)
+        mean = float(np.average(y, weights=weights))
+    centred = (X - centre) * root
+    targets = ((y - mean)[:, None] * root).ravel()
+    size = column_rms(centred)
+    size[size <= CONSTANT * column_rms(X * root)] = 0.0
     scales = scales_of(size, scale)
 
-    left, singular_values, directions = np.linalg.svd(centred / scales)
+    with single_threaded():
+        left, singular_values, directions = np.linalg.svd(
+            centred / scales, full_matrices=False
+        )
     projections = left.T @ targets
-    kept = min(n_samples, n_features)
-    beyond = projections[kept:]
-    outside = out_of_reach**2 + np.sum(beyond**2)
-
-    means = np.zeros(n_features + 1)
-    if fit_intercept:
-        means = R[0, 1:] / R[0, 0]
+    beyond = targets - left @ projections
     return Decomposition(
-        singular_values=singular_values[:kept],
-        directions=directions[:kept],
-        projections=projections[:kept],
-        outside=float(outside),
-        n_free=n_samples - first,
-        centre=means[:-1],
-        mean=float(means[-1]),
+        singular_values=singular_values,
+        directions=directions,
+        projections=projections,
+        outside=float(beyond @ beyond),
+        n_free=len(y) - int(fit_intercept),
+        centre=centre,
+        mean=mean,
         scale=scales,
-        n_samples=n_samples,
+        n_samples=len(y),
     )
-
-
-def _variations(uncentred: Floats, centred: Floats, n_samples: int) -> Floats:
-    """Sizes of the centred features; 0 of those that are constant but for rounding."""
-    size = _sizes(centred, n_samples)
-    whole_size = _sizes(uncentred, n_samples)
-    smallest = CONSTANT * whole_size
-    size[size <= smallest] = 0.0
-    return size
-
-
-def _sizes(triangle: Floats, n_samples: int) -> Floats:
-    """Root mean square of the features by the rows of their triangle."""
-    squares = np.sum(triangle**2, axis=0)
-    return np.asarray(np.sqrt(squares / n_samples))
 
 
 def keep_solution(
@@ -237,30 +156,24 @@ def keep_solution(
 
     # Huber's sandwich: the residuals that count are the weighted ones, the moment is
     # that of all samples
-    counted = residuals
-    inflation = 1.0
-    if weights is not None:
-        counted = residuals * weights
-        inflation = len(y) / float(weights.sum())
-    noise_variance = problem.noise_variance(filters, counted)
-    by_unit_noise = problem.unit_covariance(filters)
-
-    estimator.coef_ = coefficients
-    estimator.intercept_ = intercept
-    estimator.singular_values_ = problem.singular_values
-    estimator.inverse_moment_ = problem.inverse_moment(filters)
-    estimator.noise_variance_ = noise_variance
-    estimator.covariance_ = noise_variance * inflation * by_unit_noise
+    counts = np.ones(len(y)) if weights is None else weights
+    noise_variance = problem.noise_variance(filters, residuals * counts)
+    inflation = len(y) / float(counts.sum())
+    vars(estimator).update(
+        coef_=coefficients,
+        intercept_=intercept,
+        singular_values_=problem.singular_values,
+        inverse_moment_=problem.inverse_moment(filters),
+        noise_variance_=noise_variance,
+        covariance_=noise_variance * inflation * problem.unit_covariance(filters),
+    )
     return residuals
 
 
 def scales_of(size: Floats, scale: bool | ArrayLike) -> Floats:
     """Divisors of features of the given sizes; 1 for a feature that is zero."""
     if isinstance(scale, bool | np.bool_):
-        if not scale:
-            return np.ones(len(size))
-        return np.where(size > 0.0, size, 1.0)
-
+        return np.where((size > 0.0) & scale, size, 1.0)
     given = check_scale(scale)
     if given.shape != size.shape:
         raise InputError(
@@ -271,14 +184,13 @@ def scales_of(size: Floats, scale: bool | ArrayLike) -> Floats:
 
 
 def check_scale(scale: Any) -> Floats:
-    """Return the scales of features as an array; a boolean becomes an empty one."""
-    if isinstance(scale, bool | np.bool_):
-        return np.empty(0)
+    """Return the scales of features as an array; refuse what is none."""
     try:
         given = np.asarray(scale, dtype=float)
     except (TypeError, ValueError):
         given = np.full(1, np.nan)
-    if not np.all(np.isfinite(given) & (given > 0.0)):
+    is_flag = isinstance(scale, bool | np.bool_)
+    if not is_flag and not np.all(np.isfinite(given) & (given > 0.0)):
         raise InputError(
             f"scale: expected finite numbers above 0, True or False, got {scale!r}"
         )

@@ -1,7 +1,7 @@
 """Interface of the estimators that `identify` fits, and what a method may use."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, Self
 
 import numpy as np
@@ -48,6 +48,15 @@ class FitTask:
     samples: Samples  # the regression of each equation
     blank: ShipModel  # the model but for its coefficients
     trials: Sequence[Trial]  # those behind the samples
+
+    def without(self, trials: Sequence[int]) -> Self:
+        """The task of the other trials, by their places."""
+        others = np.setdiff1d(range(len(self.trials)), trials)
+        return replace(
+            self,
+            samples=self.samples.select(np.isin(self.samples.trial, others)),
+            trials=[self.trials[place] for place in others],
+        )
 
 
 Estimators = dict[str, Estimator]

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-from identification.samples.folds import FOLDS, TRIALS
 from shipgym.checks import check_choice, check_number, check_whole
 
 
@@ -10,8 +9,7 @@ from shipgym.checks import check_choice, check_number, check_whole
 class KernelResidual:
     """Fixed-size LS-SVM with a kernel on what a reference ship leaves.
 
-    The reference ship is that of `grey-box`, the fitted model of the structure named,
-    or, for a black box, a linear model.
+    The reference ship is that of `grey-box`, or the fitted model of a named structure.
 
     Parameters
     ----------
@@ -25,16 +23,12 @@ class KernelResidual:
     C : float or None, above 0
         Weight of the squared errors over a ship length, prime system. None chooses it
         by held-out trials.
-    folds : {"trials", "largest-rudder"}
-        What these choices hold out: each trial in turn, or the trials of the largest
-        rudder together.
     """
 
     kernel: str = "rbf"
     centres: int = 64
     length: float | None = None
     C: float | None = None
-    folds: str = TRIALS
 
     def __post_init__(self) -> None:
         from shipgym.ships.kernel_boxes import RBF, SIZES  # most runs have no kernel
@@ -45,4 +39,3 @@ class KernelResidual:
             check_number(self.length, "length", above=0.0)
         if self.C is not None:
             check_number(self.C, "C", above=0.0)
-        check_choice(self.folds, FOLDS, "folds")

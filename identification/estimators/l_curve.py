@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import fdtri
 
+from identification.estimators.decomposition import Decomposition
 from shipgym.arrays import Floats
 
 
@@ -16,22 +17,18 @@ class LCurve:
     solution_norm: Floats  # of the scaled coefficients, shape (n_ranks,)
 
 
-def l_curve(
-    singular_values: Floats,
-    projections: Floats,
-    filters: Floats,
-    outside: float,
-) -> LCurve:
-    """Norms for every rank from the directions of a `Decomposition`."""
-    whole = projections**2
-    beyond_rank = whole.sum() - np.cumsum(whole)
-    shrinkage = 1.0 - singular_values * filters
-    left = projections * shrinkage
-    within_rank = np.cumsum(left**2)
+def l_curve(problem: Decomposition, filters: Floats) -> LCurve:
+    """Norms for every rank above rounding."""
+    distinct = problem.numerical_rank
+    kept = slice(distinct)
+    projections = problem.projections[kept]
+    squares = problem.projections**2
+    outside = problem.outside + float(squares[distinct:].sum())
+    beyond_rank = squares[kept].sum() - np.cumsum(squares[kept])
+    shrinkage = 1.0 - problem.singular_values[kept] * filters[kept]
+    within_rank = np.cumsum((projections * shrinkage) ** 2)
     residual = beyond_rank + within_rank + max(outside, 0.0)
-
-    coefficients = filters * projections
-    solution = np.cumsum(coefficients**2)
+    solution = np.cumsum((filters[kept] * projections) ** 2)
     return LCurve(
         residual_norm=np.sqrt(np.maximum(residual, 0.0)),
         solution_norm=np.sqrt(solution),
@@ -84,7 +81,11 @@ def _allowed_growth(full: int, freedom: int, significance: float) -> Floats:
     dropped = np.arange(full)[::-1]
     numerator = np.maximum(dropped, 1)
     probability = 1.0 - significance
-    quantile = fdtri(numerator, freedom, probability)
+    quantile = fdtri(
+        numerator,
+        freedom,
+        probability,
+    )
     growth = dropped / freedom * quantile
     return np.asarray(1.0 + growth)
 

@@ -1,7 +1,7 @@
 """Common parts of the linear estimators: prediction and checks of arguments."""
 
 from numbers import Real
-from typing import Any, ClassVar, TypeGuard
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,17 +45,7 @@ class LinearRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
 
 def validated(estimator: Any, X: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
-    """Features and targets as arrays of numbers, as scikit-learn checks them.
-
-    Its checks of sound arrays take as long as the decomposition, so these skip them.
-    """
-    if _is_sound(X, 2) and _is_sound(y, 1):
-        n_samples, n_features = X.shape
-        if n_samples == len(y) and n_samples >= 2 and n_features > 0:
-            estimator.n_features_in_ = n_features
-            vars(estimator).pop("feature_names_in_", None)
-            return X, y
-
+    """Features and targets as arrays of numbers, as scikit-learn checks them."""
     features, targets = validate_data(
         estimator,
         X,
@@ -65,15 +55,6 @@ def validated(estimator: Any, X: ArrayLike, y: ArrayLike) -> tuple[Floats, Float
         ensure_min_samples=2,
     )
     return features, np.asarray(targets, dtype=np.float64)
-
-
-def _is_sound(values: ArrayLike, n_dimensions: int) -> TypeGuard[Floats]:
-    """Tell a plain array of finite numbers of double precision from anything else."""
-    if type(values) is not np.ndarray:
-        return False
-    if values.dtype != np.float64 or values.ndim != n_dimensions:
-        return False
-    return bool(np.isfinite(values).all())
 
 
 def check_weight(value: Any, argument: str = "C") -> float:

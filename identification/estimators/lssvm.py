@@ -103,27 +103,13 @@ class LSSVM(LinearRegressor):
         return self.C
 
     def _fit_primal(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
-        problem = decompose(
-            X,
-            y=y,
-            scale=self.scale,
-            fit_intercept=self.fit_intercept,
-            weights=weights,
-        )
-        n_directions = len(problem.singular_values)
-        filters = problem.filters(self.error_weight(), n_directions)
-        return keep_solution(
-            self,
-            problem=problem,
-            filters=filters,
-            X=X,
-            y=y,
-            weights=weights,
-        )
+        problem = decompose(X, y, self.scale, self.fit_intercept, weights)
+        filters = problem.filters(self.error_weight(), X.shape[1])
+        return keep_solution(self, problem, filters, X, y, weights)
 
 
 @dataclass(eq=False, repr=False)
-class TruncatedLSSVM(LinearRegressor):
+class TruncatedLSSVM(LSSVM):
     """Truncated least-squares support vector machine with a linear kernel.
 
     Source: Xu 2020, section 3.2. Keeps the `rank_` largest singular values of the
@@ -155,9 +141,6 @@ class TruncatedLSSVM(LinearRegressor):
         Number of directions kept.
     l_curve_ : LCurve
         Norms of residual and solution for each rank.
-    directions_ : array of shape (n_directions, n_features)
-        Right singular vectors, of the scaled features, in the order of
-        `singular_values_`.
     collinear_groups_ : tuple of tuple of int
         For each dropped direction its features.
     """
@@ -174,67 +157,25 @@ class TruncatedLSSVM(LinearRegressor):
     C: float = np.inf
     rank: int | None = None
     selection: str = "l-curve"
-    scale: bool | ArrayLike = True
-    fit_intercept: bool = True
-    robust: bool = False
 
     def check(self) -> None:
         """Refuse settings that cannot be, by an InputError that names the setting."""
-        selections = ("l-curve", "gcv", "full")
-        check_choice(self.selection, selections, "selection")
-        check_weight(self.C)
-        check_scale(self.scale)
+        super().check()
+        check_choice(self.selection, ("l-curve", "gcv", "full"), "selection")
         if self.rank is not None:
             check_whole(self.rank, "rank", at_least=1, hint="or None")
-        check_flag(self.robust, "robust")
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit to samples (n_samples, n_features) and targets (n_samples,)."""
-        self.check()
-        features, targets = validated(self, X, y)
-        self.weights_ = fit_weighted(
-            lambda weights: self._fit(features, targets, weights),
-            y=targets,
-            robust=self.robust,
-        )
-        return self
-
-    def error_weight(self) -> float:
-        """Weight of the squared errors in the solution."""
-        return self.C
-
-    def _fit(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
-        problem = decompose(
-            X,
-            y=y,
-            scale=self.scale,
-            fit_intercept=self.fit_intercept,
-            weights=weights,
-        )
+    def _fit_primal(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
+        problem = decompose(X, y, self.scale, self.fit_intercept, weights)
         distinct = problem.numerical_rank
         filters = problem.filters(self.C, distinct)
-
-        lost = problem.projections[distinct:]
-        self.l_curve_ = l_curve(
-            problem.singular_values[:distinct],
-            projections=problem.projections[:distinct],
-            filters=filters[:distinct],
-            outside=problem.outside + float(np.sum(lost**2)),
-        )
+        self.l_curve_ = l_curve(problem, filters)
         self.rank_ = self._chosen_rank(problem, distinct)
         filters[self.rank_ :] = 0.0
 
-        self.directions_ = problem.directions
         dropped = problem.directions[self.rank_ :]
         self.collinear_groups_ = tuple(_main_features(row) for row in dropped)
-        return keep_solution(
-            self,
-            problem=problem,
-            filters=filters,
-            X=X,
-            y=y,
-            weights=weights,
-        )
+        return keep_solution(self, problem, filters, X, y, weights)
 
     def _chosen_rank(self, problem: Decomposition, distinct: int) -> int:
         if self.rank is not None:

@@ -1,17 +1,84 @@
 """Optimisers: grid, particle swarm and artificial bee colony."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, cast
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from identification.estimators.search import Optimiser, Recorder
 from shipgym import InputError
 from shipgym.arrays import Floats, Integers
 from shipgym.checks import check_choice, check_whole
 
-MOST = 100_000  # particles, rounds and the like of a search
+#: Values of candidates, an array of shape (n_candidates, n_dimensions) ->
+#: (n_candidates,).
+Objective = Callable[[Floats], Floats]
+
+
+class SearchResult(NamedTuple):
+    """The outcome of a search."""
+
+    x: Floats  # the best candidate, shape (n_dimensions,)
+    value: float  # its objective
+    evaluations: int  # number of candidates evaluated
+
+
+@dataclass(eq=False)
+class Recorder:
+    """Evaluates candidates and keeps the best."""
+
+    objective: Objective
+    x: Floats = field(default_factory=lambda: np.empty(0))  # the best candidate so far
+    value: float = np.inf  # its objective
+    evaluations: int = 0
+
+    def __call__(self, candidates: Floats) -> Floats:
+        """Values of candidates; what is not a number counts as infinitely bad."""
+        values = np.nan_to_num(self.objective(candidates), nan=np.inf, posinf=np.inf)
+        self.evaluations += len(candidates)
+        best = int(np.argmin(values))
+        if values[best] < self.value or not self.x.size:
+            self.x = candidates[best].copy()
+            self.value = float(values[best])
+        return values
+
+
+class Optimiser(ABC):
+    """Minimises an objective within a box; its settings are fields of a dataclass."""
+
+    def __post_init__(self) -> None:
+        for item in fields(self):  # type: ignore[arg-type]
+            if isinstance(item.default, int):
+                check_whole(
+                    getattr(self, item.name), item.name, at_least=1, at_most=100_000
+                )
+
+    def minimise(
+        self, objective: Objective, bounds: ArrayLike, seed: int = 0
+    ) -> SearchResult:
+        """Minimise an objective; the same seed gives the same search.
+
+        The objective gives values, shape (n_candidates,), of candidates of shape
+        (n_candidates, n_dimensions); the bounds, finite and the lower one first, have
+        shape (n_dimensions, 2).
+        """
+        record = Recorder(objective)
+        low, high = np.asarray(bounds, dtype=float).T
+        self._search(
+            record,
+            low,
+            high,
+            np.random.default_rng(seed),
+        )
+        return SearchResult(record.x, record.value, record.evaluations)
+
+    @abstractmethod
+    def _search(
+        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
+    ) -> None:
+        """Evaluate candidates by `record`."""
 
 
 @dataclass(frozen=True)
@@ -33,21 +100,18 @@ class GridSearch(Optimiser):
     refinements: int = 1
 
     def _search(
-        self,
-        record: Recorder,
-        low: Floats,
-        high: Floats,
-        rng: np.random.Generator,
+        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
     ) -> None:
-        points = check_whole(self.points, "points", at_least=3, at_most=MOST)
-        check_whole(self.refinements, "refinements", at_least=0, at_most=MOST)
-
         first, last = low, high
         for _ in range(self.refinements + 1):
-            axes = np.linspace(first, last, points).T
+            axes = np.linspace(
+                first,
+                last,
+                self.points,
+            ).T
             grid = np.meshgrid(*axes, indexing="ij")
             record(np.stack(grid, axis=-1).reshape(-1, len(low)))
-            step = (last - first) / (points - 1)
+            step = (last - first) / (self.points - 1)
             first = np.maximum(record.x - step, low)
             last = np.minimum(record.x + step, high)
 
@@ -78,51 +142,31 @@ class ParticleSwarm(Optimiser):
     common: float = 1.49618
 
     def _search(
-        self,
-        record: Recorder,
-        low: Floats,
-        high: Floats,
-        rng: np.random.Generator,
+        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
     ) -> None:
-        n = check_whole(self.particles, "particles", at_least=1, at_most=MOST)
-        check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
-        place, values = _start(
-            record,
-            count=n,
-            low=low,
-            high=high,
-            rng=rng,
+        place = _drawn(
+            self.particles,
+            low,
+            high,
+            rng,
         )
+        values = record(place)
         velocity = np.zeros(place.shape)
         best = place.copy()
         for _ in range(self.rounds):
-            velocity = self._velocity(velocity, place, best, record.x, rng)
-            place = place + velocity
-
+            towards_own = rng.random(place.shape) * (best - place)
+            towards_common = rng.random(place.shape) * (record.x - place)
+            velocity = self.inertia * velocity
+            velocity += self.own * towards_own + self.common * towards_common
+            moved = place + velocity
+            place = np.clip(moved, low, high)
             # a particle at a wall does not go on pushing against it
-            outside = (place < low) | (place > high)
-            place = np.clip(place, low, high)
-            velocity[outside] = 0.0
+            velocity[moved != place] = 0.0
 
             found = record(place)
             better = found < values
             best[better] = place[better]
             values[better] = found[better]
-
-    def _velocity(
-        self,
-        velocity: Floats,
-        place: Floats,
-        best: Floats,
-        common_best: Floats,
-        rng: np.random.Generator,
-    ) -> Floats:
-        """Next velocity, towards the best place of each particle and of the swarm."""
-        by_own = self.own * rng.random(place.shape)
-        by_common = self.common * rng.random(place.shape)
-        towards_own = by_own * (best - place)
-        towards_common = by_common * (common_best - place)
-        return self.inertia * velocity + towards_own + towards_common
 
 
 @dataclass(frozen=True)
@@ -150,122 +194,69 @@ class ArtificialBeeColony(Optimiser):
     limit: int = 20
 
     def _search(
-        self,
-        record: Recorder,
-        low: Floats,
-        high: Floats,
-        rng: np.random.Generator,
+        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
     ) -> None:
-        n = check_whole(self.sources, "sources", at_least=2, at_most=MOST)
-        check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
-        check_whole(self.limit, "limit", at_least=1, at_most=MOST)
-        places, values = _start(
-            record,
-            count=n,
-            low=low,
-            high=high,
-            rng=rng,
-        )
-        colony = Colony(
-            places=places,
-            values=values,
-            idle=np.zeros(n, dtype=np.int64),
-        )
+        n = self.sources
+        places = _drawn(n, low, high, rng)
+        values = record(places)
+        idle = np.zeros(n, dtype=int)  # moves since the last improvement
+
+        def send_bees(chosen: Integers) -> None:
+            """Move the chosen sources, and keep the moves that improve them."""
+            moved = np.clip(_neighbours(places, chosen, rng), low, high)
+            found = record(moved)
+            np.add.at(idle, chosen, 1)
+            # of several bees at one source the best is last, and stays
+            order = np.argsort(-found, kind="stable")
+            better = order[found[order] < values[chosen[order]]]
+            improved = chosen[better]
+            places[improved] = moved[better]
+            values[improved] = found[better]
+            idle[improved] = 0
+
         for _ in range(self.rounds):
-            colony.send_bees(np.arange(n), record, low, high, rng)
-            onlookers = colony.chances().searchsorted(rng.random(n), "right")
-            colony.send_bees(onlookers, record, low, high, rng)
-            left = np.flatnonzero(colony.idle > self.limit)
+            send_bees(np.arange(n))
+            send_bees(_chances(values).searchsorted(rng.random(n), "right"))
+            left = np.flatnonzero(idle > self.limit)
             if left.size:
-                colony.renew(left, _drawn(left.size, low, high, rng), record)
+                places[left] = _drawn(left.size, low, high, rng)
+                values[left] = record(places[left])
+                idle[left] = 0
 
 
-@dataclass(eq=False)
-class Colony:
-    """Food sources of a bee colony."""
+def _neighbours(places: Floats, chosen: Integers, rng: np.random.Generator) -> Floats:
+    """Sources moved in one dimension each, towards or away from another.
 
-    places: Floats  # shape (n_sources, n_dimensions)
-    values: Floats  # the objective there, shape (n_sources,)
-    idle: Integers  # moves since the last improvement, shape (n_sources,)
+    That is x + a (x - x of the other), with a in [-1, 1].
+    """
+    n_sources, n_dimensions = places.shape
+    by_distance, by_axis, by_stride = rng.random((3, len(chosen)))
+    distance = 1 + (by_distance * (n_sources - 1)).astype(int)
+    other = (chosen + distance) % n_sources
+    bee, axis = np.arange(len(chosen)), (by_axis * n_dimensions).astype(int)
+    moved = places[chosen]
+    away = moved[bee, axis] - places[other, axis]
+    moved[bee, axis] += (2.0 * by_stride - 1.0) * away
+    return moved
 
-    def chances(self) -> Floats:
-        """Cumulative chance of each source, by its fitness, shape (n_sources,)."""
-        values = self.values
-        positive = np.maximum(values, 0.0)
-        of_positive = 1.0 / (1.0 + positive)
-        of_negative = 1.0 - values
-        fitness = np.where(values >= 0.0, of_positive, of_negative)
-        total = fitness.sum()
-        if not 0.0 < total < np.inf:
-            fitness = np.ones(len(values))
-        cumulative = fitness.cumsum()
-        return np.asarray(cumulative / cumulative[-1])
 
-    def renew(self, left: Integers, places: Floats, record: Recorder) -> None:
-        """Put sources that are left at other places."""
-        self.places[left] = places
-        self.values[left] = record(places)
-        self.idle[left] = 0
-
-    def send_bees(
-        self,
-        chosen: Integers,
-        record: Recorder,
-        low: Floats,
-        high: Floats,
-        rng: np.random.Generator,
-    ) -> None:
-        """Move the chosen sources, and keep the moves that improve them."""
-        moved = np.clip(self._moved(chosen, rng), low, high)
-        found = record(moved)
-        self.idle += np.bincount(chosen, minlength=len(self.values))
-
-        # of several bees at one source the best is last, and stays
-        better = np.flatnonzero(found < self.values[chosen])
-        falling = np.argsort(-found[better], kind="stable")
-        better = better[falling]
-        improved = chosen[better]
-        self.places[improved] = moved[better]
-        self.values[improved] = found[better]
-        self.idle[improved] = 0
-
-    def _moved(self, chosen: Integers, rng: np.random.Generator) -> Floats:
-        """Sources moved in one dimension each, towards or away from another.
-
-        That is x + a (x - x of the other), with a in [-1, 1].
-        """
-        n_sources, n_dimensions = self.places.shape
-        n_others = n_sources - 1
-        n_bees = len(chosen)
-        by_distance, by_axis, by_stride = rng.random((3, n_bees))
-        distance = 1 + (by_distance * n_others).astype(np.int64)
-        other = (chosen + distance) % n_sources
-        axis = (by_axis * n_dimensions).astype(np.int64)
-        stride = 2.0 * by_stride - 1.0
-
-        moved = self.places[chosen]
-        bee = np.arange(n_bees)
-        away = moved[bee, axis] - self.places[other, axis]
-        moved[bee, axis] += stride * away
-        return moved
+def _chances(values: Floats) -> Floats:
+    """Cumulative chance of each source, by its fitness, shape (n_sources,)."""
+    of_positive = 1.0 / (1.0 + np.maximum(values, 0.0))
+    fitness = np.where(
+        values >= 0.0,
+        of_positive,
+        1.0 - values,
+    )
+    if not 0.0 < fitness.sum() < np.inf:
+        fitness = np.ones(len(values))
+    cumulative = fitness.cumsum()
+    return np.asarray(cumulative / cumulative[-1])
 
 
 def _drawn(count: int, low: Floats, high: Floats, rng: np.random.Generator) -> Floats:
     """Candidates evenly distributed in the box, shape (count, n_dimensions)."""
     return low + (high - low) * rng.random((count, len(low)))
-
-
-def _start(
-    record: Recorder,
-    count: int,
-    low: Floats,
-    high: Floats,
-    rng: np.random.Generator,
-) -> tuple[Floats, Floats]:
-    """The first round: candidates drawn in the box, and their values."""
-    drawn = _drawn(count, low, high, rng)
-    values = record(drawn)
-    return drawn, values
 
 
 OPTIMISERS: dict[str, type[Optimiser]] = {
@@ -277,11 +268,15 @@ OPTIMISERS: dict[str, type[Optimiser]] = {
 
 def get_optimiser(optimiser: str | Mapping[str, Any] | Optimiser) -> Optimiser:
     """An optimiser as given, by name, or by a table `{"name": "abc", "rounds": 60}`."""
-    if hasattr(optimiser, "minimise"):
-        return cast(Optimiser, optimiser)
+    if isinstance(optimiser, Optimiser):
+        return optimiser
     table = optimiser if isinstance(optimiser, Mapping) else {"name": optimiser}
     settings = dict(table)
-    name = check_choice(settings.pop("name", None), OPTIMISERS, "optimiser")
+    name = check_choice(
+        settings.pop("name", None),
+        OPTIMISERS,
+        "optimiser",
+    )
     try:
         return OPTIMISERS[name](**settings)
     except TypeError as error:

@@ -8,64 +8,37 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from identification.estimators.search import Recorder
 from shipgym.arrays import Floats
 
 
 def pattern_search(
     objective: Callable[[Floats], float],
-    start: ArrayLike,
-    low: ArrayLike,
-    high: ArrayLike,
+    start: Floats,
     mesh: float = 0.25,
     finest: float = 1.0 / 64.0,
     most_evaluations: int = 200,
 ) -> Floats:
-    """Minimise a function of few variables without derivatives, within bounds.
+    """Minimise a function of a point of the unit cube without derivatives.
 
     Each round polls the 2n neighbours on the mesh and moves to the best of them if it
     is better; else the mesh is halved until it is finer than `finest`. No point is
-    evaluated twice.
-
-    Parameters
-    ----------
-    objective : callable
-        Value of a point of shape (n,); may be infinite.
-    start, low, high : array-like of shape (n,)
-        First point and bounds.
-    mesh, finest : float
-        First and finest mesh, by the distance of the bounds.
-    most_evaluations : int
-        After which no round begins.
+    evaluated twice, and no round begins after `most_evaluations`.
     """
-    lowest = np.asarray(low, dtype=float)
-    highest = np.asarray(high, dtype=float)
 
     @cache
     def value_at(*point: float) -> float:
         return objective(np.array(point))
 
-    def values_at(points: Floats) -> Floats:
-        return np.array([value_at(*point) for point in points.tolist()])
-
-    record = Recorder(values_at)
-    first = np.clip(np.asarray(start, dtype=float), lowest, highest)
-    record(first[None])
-
-    directions = _directions(highest - lowest)
+    best = np.clip(start, 0.0, 1.0)
+    value_at(*best.tolist())
+    axes = np.eye(len(best))
+    directions = np.vstack([axes, -axes])
     while mesh >= finest and value_at.cache_info().currsize < most_evaluations:
-        before = record.value
-        neighbours = record.x + mesh * directions
-        record(np.clip(neighbours, lowest, highest))
-        if not record.value < before:
+        neighbours = np.clip(best + mesh * directions, 0.0, 1.0).tolist()
+        nearest = min(neighbours, key=lambda point: value_at(*point))
+        if value_at(*nearest) < value_at(*best.tolist()):
+            best = np.array(nearest)
+        else:
             mesh *= 0.5
-    return record.x
-
-
-def _directions(sides: Floats) -> Floats:
-    """Steps along both ways of each axis of a box, shape (2 n, n)."""
-    axes = np.eye(len(sides))
-    both_ways = np.vstack([axes, -axes])
-    return np.asarray(sides * both_ways)
+    return best

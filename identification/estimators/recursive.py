@@ -106,7 +106,12 @@ class Recursion(LinearRegressor):
 
     def check(self) -> None:
         """Refuse settings that cannot be, by an InputError that names the setting."""
-        check_number(self.forgetting, "forgetting", above=0.0, at_most=1.0)
+        check_number(
+            self.forgetting,
+            "forgetting",
+            above=0.0,
+            at_most=1.0,
+        )
         check_number(self.C, "C", above=0.0)
         check_scale(self.scale)
         check_number(self.start_C, "start_C", above=0.0)
@@ -140,7 +145,11 @@ class Recursion(LinearRegressor):
         theta = np.zeros(n_features)
         covariance = self.C * np.eye(n_features)
         if gathered:
-            start = LSSVM(C=self.start_C, scale=self.scale_, fit_intercept=False)
+            start = LSSVM(
+                C=self.start_C,
+                scale=self.scale_,
+                fit_intercept=False,
+            )
             start.fit(features[picked], targets[picked])
             theta = start.coef_ * self.scale_ / unit
             covariance = start.inverse_moment_ * np.outer(self.scale_, self.scale_)
@@ -164,31 +173,31 @@ class Recursion(LinearRegressor):
 
     def _influence(self, n_samples: int) -> Floats:
         """Weights of samples that are taken in, of which the older ones count less."""
-        age = np.arange(n_samples - 1.0, -1.0, -1.0)
+        age = np.arange(
+            n_samples - 1.0,
+            -1.0,
+            -1.0,
+        )
         # a sample is seen again while it is among the last
         times_seen = np.minimum(self.innovations, age + 1.0)
         return np.asarray(times_seen * self.forgetting**age)
 
     def _summarise(self, features: Floats, targets: Floats) -> None:
         """Set moment and covariance of the estimate that the recursion tends to."""
-        weights = self.weights_
+        counts = self.weights_
         scaled = features / self.scale_
-        start = np.eye(scaled.shape[1]) / self.C
-        moment = (scaled.T * weights) @ scaled + start
-        inverse = np.linalg.inv(moment)
-
+        n_features = scaled.shape[1]
+        start = np.eye(n_features) / self.C
+        of_samples = (scaled.T * counts) @ scaled
+        inverse = np.linalg.inv(of_samples + start)
         errors = targets - features @ self.coef_
-        of_samples = moment - start
-        n_effective = float(np.sum(inverse * of_samples))
-        freedom = max(weights.sum() - n_effective, 1.0)
-        variance = float(weights @ errors**2) / freedom
-        middle = (scaled.T * weights**2) @ scaled
-        covariance = variance * (inverse @ middle @ inverse)
-
+        freedom = max(counts.sum() - np.sum(inverse * of_samples), 1.0)
+        self.noise_variance_ = float(counts @ errors**2) / freedom
+        middle = (scaled.T * counts**2) @ scaled
         unscale = np.outer(self.scale_, self.scale_)
         self.inverse_moment_ = inverse / unscale
-        self.noise_variance_ = variance
-        self.covariance_ = covariance / unscale
+        sandwich = inverse @ middle @ inverse
+        self.covariance_ = self.noise_variance_ * sandwich / unscale
 
     @abstractmethod
     def _advance(self, phi: Floats, y: Floats, start: _Start, history: Floats) -> None:
@@ -206,19 +215,17 @@ class RecursiveLeastSquares(Recursion):
     options: ClassVar[tuple[str, ...]] = OPTIONS
 
     def _advance(self, phi: Floats, y: Floats, start: _Start, history: Floats) -> None:
-        n_features = phi.shape[1]
         run = least_squares(self.inverse_free)
         run(
             phi,
             y,
             start.theta,
             start.covariance,
-            np.full(n_features, float(self.C)),
+            np.full(phi.shape[1], float(self.C)),
             float(self.forgetting),
             self.innovations,
             float(self.omega),
             history,
-            np.empty(n_features),
         )
 
 

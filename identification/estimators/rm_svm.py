@@ -19,6 +19,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.svm import SVR, LinearSVR
 
 from identification.arrays import column_rms, mean_square, root_mean_square
+from identification.estimators.decomposition import scales_of
 from identification.estimators.estimator import Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, validated
 from identification.estimators.pattern_search import pattern_search
@@ -88,14 +89,18 @@ class RMSVM(LinearRegressor):
         """Fit to samples (n_samples, n_features) and targets (n_samples,)."""
         self.check()
         features, targets = validated(self, X, y)
-        size = column_rms(features)
-        scale = np.where(size > 0.0, size, 1.0)
+        scale = scales_of(column_rms(features), True)
         deviation = root_mean_square(targets) or 1.0
-        weight = 1.0 if self.C is None else float(self.C)
+        weight = self.weight_of_errors
         self.coef_ = np.zeros(features.shape[1])
         if weight != NO_CORRECTION:
             C = weight / len(targets)
-            slopes = _through_zero(features / scale, targets / deviation, C, self.band)
+            slopes = _through_zero(
+                features / scale,
+                targets / deviation,
+                C,
+                self.band,
+            )
             self.coef_ = slopes * deviation / scale
 
         # the uncertainty of no correction is that of the weakest
@@ -103,6 +108,11 @@ class RMSVM(LinearRegressor):
         moment = features.T @ features + np.diag(strength * scale**2)
         self.set_covariance(features, targets, moment)
         return self
+
+    @property
+    def weight_of_errors(self) -> float:
+        """The weight of the errors, where none is given 1."""
+        return 1.0 if self.C is None else float(self.C)
 
     @property
     def band(self) -> float:
@@ -137,18 +147,10 @@ class RMSVM(LinearRegressor):
         tuner = _Tuner(self, task)
         weight = tuner.weight() if self.C is None else float(self.C)
         bands = tuner.bands(weight)
-
         found: Estimators = {}
-        for k, q in enumerate(task.samples.features):
-            band = bands[k]
-            estimator = tuner.fitted(
-                q,
-                weight=weight,
-                band=band,
-                rows=tuner.everything,
-            )
-            estimator.chosen_ = {"C": weight, "epsilon": band}
-            found[q] = estimator
+        for q, band in zip(task.samples.features, bands, strict=True):
+            found[q] = tuner.fitted(q, weight, band, tuner.everything)
+            found[q].chosen_ = {"C": weight, "epsilon": band}  # type: ignore[attr-defined]
         return found
 
 
@@ -198,25 +200,25 @@ class _Tuner:
         """The estimator of one equation for some of the rows."""
         key = (equation, weight, band, rows.tobytes())
         if key not in self._known:
-            estimator = clone(self.asked).set_params(
-                C=weight,
-                epsilon=band,
+            used = np.flatnonzero(rows)[:: self.every]
+            self._known[key] = (
+                clone(self.asked)
+                .set_params(C=weight, epsilon=band)
+                .fit(
+                    self.samples.features[equation][used],
+                    self.samples.targets[equation][used],
+                )
             )
-            chosen = np.flatnonzero(rows)
-            used = chosen[:: self.every]
-            X = self.samples.features[equation][used]
-            y = self.samples.targets[equation][used]
-            self._known[key] = estimator.fit(X, y)
         return self._known[key]
 
     def model(self, weight: float, bands: Sequence[float], rows: Flags) -> ShipModel:
         """The grey box with the corrections fitted to some of the rows."""
-        coefficients = {}
-        equations = self.samples.features
-        for q, band in zip(equations, bands, strict=True):
-            estimator = self.fitted(q, weight, band, rows)
-            coefficients[q] = estimator.coef_
-        return self.blank.with_accelerations(coefficients)
+        return self.blank.with_accelerations(
+            {
+                q: self.fitted(q, weight, band, rows).coef_
+                for q, band in zip(self.samples.features, bands, strict=True)
+            }
+        )
 
     def weight(self) -> float:
         """The least weight of the errors nearly as good as the best, on data held out.
@@ -228,15 +230,10 @@ class _Tuner:
         folds = list(held_out_rows(self.trials, self.samples, self.asked.folds))
 
         def error(weight: float) -> float:
-            errors = []
-            for rows, held in folds:
-                model = self.model(
-                    weight,
-                    bands=self.first_bands,
-                    rows=rows,
-                )
-                own = heading_error(model, held)
-                errors.append(own)
+            errors = [
+                heading_error(self.model(weight, self.first_bands, rows), held)
+                for rows, held in folds
+            ]
             return float(np.mean(errors))
 
         errors = [error(weight) for weight in WEIGHTS]
@@ -245,29 +242,15 @@ class _Tuner:
     def bands(self, weight: float) -> list[float]:
         """The insensitive bands, by a pattern search on simulated headings."""
         first = self.first_bands
-        asked = self.asked
-        if asked.epsilon is not None or weight == NO_CORRECTION:
+        if self.asked.epsilon is not None or weight == NO_CORRECTION:
             return first
 
         def error(bands: Floats) -> float:
-            model = self.model(
-                weight,
-                bands=bands.tolist(),
-                rows=self.everything,
-            )
-            errors = []
-            for trial in self.trials:
-                own = asked.error(model, trial)
-                errors.append(own)
+            model = self.model(weight, bands.tolist(), self.everything)
+            errors = [self.asked.error(model, trial) for trial in self.trials]
             return float(np.mean(errors))
 
-        best = pattern_search(
-            error,
-            start=first,
-            low=np.zeros(len(first)),
-            high=np.ones(len(first)),
-        )
-        found: list[float] = best.tolist()
+        found: list[float] = pattern_search(error, np.array(first)).tolist()
         return found
 
 
@@ -290,10 +273,10 @@ def most_regularised(
         Times the least error counts as equally good.
     """
     allowed = tolerance * min(errors)
-    for choice, error in zip(choices, errors, strict=True):
-        if error <= allowed:
-            return choice
-    return choices[0]
+    as_good = (
+        choice for choice, one in zip(choices, errors, strict=True) if one <= allowed
+    )
+    return next(as_good, choices[0])
 
 
 def heading_error(model: ShipModel, trial: Trial) -> float:

@@ -6,21 +6,12 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sklearn.base import clone
 
 from identification.estimators.decomposition import check_scale
-from identification.estimators.estimator import Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, check_weight, validated
 from identification.estimators.lssvm import LSSVM
-from identification.estimators.objectives import (
-    ErrorOfC,
-    check_folds,
-    held_out_error,
-    time_blocks,
-    training_error,
-)
-from identification.estimators.optimisers import OPTIMISERS, get_optimiser
-from identification.estimators.search import Optimiser
+from identification.estimators.objectives import ErrorOfC, time_blocks
+from identification.estimators.optimisers import OPTIMISERS, Optimiser, get_optimiser
 from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_flag, check_whole
@@ -42,8 +33,8 @@ class TunedLSSVM(LinearRegressor):
         whose optimum is the upper bound.
     bounds : tuple of float
         Least and largest C.
-    folds : int or "trials"
-        Number of blocks of time of the k-fold objective, or a block for each trial.
+    folds : int, at least 2
+        Number of blocks of time of the k-fold objective.
     seed : int, at least 0
         Of the search; the same seed gives the same search.
     scale : bool or array-like of shape (n_features,)
@@ -77,7 +68,7 @@ class TunedLSSVM(LinearRegressor):
     optimiser: str | Mapping[str, Any] | Optimiser = "abc"
     objective: str = "k-fold"
     bounds: tuple[float, float] = (1e-2, 1e12)
-    folds: int | str = 5
+    folds: int = 5
     seed: int = 0
     scale: bool | ArrayLike = True
     fit_intercept: bool = True
@@ -87,15 +78,9 @@ class TunedLSSVM(LinearRegressor):
     def method_name(self) -> str:
         """Name of the method by its search."""
         kind = type(get_optimiser(self.optimiser))
-        # Names of the methods by their search.
-        method_names = {
-            "abc": "abc-lssvr",
-            "pso": "pso-lssvr",
-            "grid": "cv-lssvr",
-        }
         for name, known in OPTIMISERS.items():
             if kind is known:
-                return method_names[name]
+                return f"{'cv' if name == 'grid' else name}-lssvr"
         return super().method_name
 
     def check(self) -> None:
@@ -104,22 +89,21 @@ class TunedLSSVM(LinearRegressor):
         objectives = ("k-fold", "training")
         check_choice(self.objective, objectives, "objective")
         self._log_bounds()
-        check_folds(self.folds)
+        check_whole(self.folds, "folds", at_least=2)
         check_whole(self.seed, "seed", at_least=0)
         check_scale(self.scale)
         check_flag(self.robust, "robust")
 
-    def fit(self, X: ArrayLike, y: ArrayLike, groups: ArrayLike | None = None) -> Self:
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Search for C and fit.
 
         Samples of shape (n_samples, n_features) are in the order of time. Targets have
-        the shape (n_samples,), as have `groups`: the trial of each sample, for
-        folds="trials".
+        the shape (n_samples,).
         """
         self.check()
         features, targets = validated(self, X, y)
         search = get_optimiser(self.optimiser).minimise(
-            self._objective(features, targets, groups),
+            self._objective(features, targets),
             bounds=[self._log_bounds()],
             seed=self.seed,
         )
@@ -142,19 +126,13 @@ class TunedLSSVM(LinearRegressor):
 
     def _log_bounds(self) -> tuple[float, float]:
         """Bounds of log10 C, checked."""
-        try:
-            low, high = self.bounds
-        except (TypeError, ValueError):
-            raise InputError(
-                "bounds: expected the least and the largest C, such as (0.01, 1e12),"
-                f" got {self.bounds!r}"
-            ) from None
-        low = check_weight(low, "bounds")
-        high = check_weight(high, "bounds")
+        is_pair = isinstance(self.bounds, list | tuple) and len(self.bounds) == 2
+        pair = self.bounds if is_pair else (np.inf, np.inf)
+        low, high = (check_weight(one, "bounds") for one in pair)
         if not low < high < np.inf:
             raise InputError(
-                "bounds: expected a least C and a finite one that is larger, got"
-                f" {(low, high)}"
+                "bounds: expected a least C and a finite one that is larger, such as"
+                f" (0.01, 1e12), got {self.bounds!r}"
             )
         return float(np.log10(low)), float(np.log10(high))
 
@@ -166,38 +144,20 @@ class TunedLSSVM(LinearRegressor):
             robust=self.robust,
         )
 
-    def _objective(self, X: Floats, y: Floats, groups: ArrayLike | None) -> ErrorOfC:
+    def _objective(self, X: Floats, y: Floats) -> ErrorOfC:
         weights = None
         if self.robust:
             _, largest = self._log_bounds()
             weights = self._estimator(10.0**largest).fit(X, y).weights_
-        if self.objective == "training":
-            return training_error(
-                X,
-                y=y,
-                scale=self.scale,
-                fit_intercept=self.fit_intercept,
-                weights=weights,
-            )
-
-        folds = self.folds
-        if isinstance(folds, int):
-            folds = min(folds, len(y))
-        blocks = time_blocks(len(y), folds, groups)
-        return held_out_error(
+        everything = np.ones(len(y), dtype=bool)
+        parts = [(everything, everything)]
+        if self.objective == "k-fold":
+            parts = time_blocks(len(y), min(self.folds, len(y)))
+        return ErrorOfC(
             X,
-            y=y,
-            scale=self.scale,
-            fit_intercept=self.fit_intercept,
-            blocks=blocks,
-            weights=weights,
+            y,
+            self.scale,
+            self.fit_intercept,
+            weights,
+            parts,
         )
-
-    def fit_equations(self, task: FitTask) -> Estimators:
-        """Copies fitted to all equations; trials may be blocks."""
-        samples = task.samples
-        found: Estimators = {}
-        for q, X, y in samples.by_equation():
-            own = clone(self)
-            found[q] = own.fit(X, y, groups=samples.trial)
-        return found

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.arrays import by_name, column_rms, root_mean_square
+from identification.arrays import by_name, column_rms, mean_square, root_mean_square
 from identification.estimators.covariance import residuals
 from identification.estimators.estimator import Estimator, Estimators
 from identification.samples.samples import Samples
@@ -32,8 +32,6 @@ class EquationDiagnostics:
     r_squared: float  # share of the change of velocity that is explained
     # root mean square of what is left of the change of velocity over a window, SI units
     residual_rms: float
-    #: of the residuals at lags of 1 to 10 windows, without overlap
-    residual_autocorrelation: tuple[float, ...]
     #: by term: how much the others increase its variance
     variance_inflation: dict[str, float]
     #: pairs of terms with a correlation beyond 0.98, and the correlation
@@ -50,7 +48,6 @@ def diagnose(
 ) -> dict[str, EquationDiagnostics]:
     """Diagnostics of each equation, of estimators fitted to the samples."""
     errors = residuals(estimators, samples)
-    apart = without_overlap(samples)
     found = {}
     for q, estimator in estimators.items():
         found[q] = _of_equation(
@@ -59,7 +56,6 @@ def diagnose(
             features=samples.features[q],
             target=samples.targets[q],
             error=errors[q],
-            apart=apart,
         )
     return found
 
@@ -70,56 +66,34 @@ def _of_equation(
     features: Floats,
     target: Floats,
     error: Floats,
-    apart: Integers,
 ) -> EquationDiagnostics:
-    """Diagnostics of an equation; `apart`: rows whose windows do not overlap."""
+    """Diagnostics of an equation."""
     scaled, condition = scaled_features(features)
-    full_rank = min(features.shape)
-    rank = getattr(estimator, "rank_", full_rank)
+    groups = getattr(estimator, "collinear_groups_", ())
     return EquationDiagnostics(
         samples=len(target),
         terms=len(names),
-        rank=int(rank),
+        rank=int(getattr(estimator, "rank_", min(features.shape))),
         condition_number=condition,
-        r_squared=_r_squared(target, error),
+        r_squared=1.0 - mean_square(error) / (mean_square(target) or 1.0),
         residual_rms=root_mean_square(error),
-        residual_autocorrelation=autocorrelation(error[apart], 10),
         variance_inflation=by_name(names, variance_inflation(scaled)),
         collinear_pairs=collinear_pairs(scaled, names),
-        dropped=_dropped(estimator, names),
+        dropped=tuple(tuple(names[term] for term in group) for group in groups),
     )
-
-
-def _r_squared(target: Floats, error: Floats) -> float:
-    """Share of the target's mean square that a fit explains."""
-    smallest = np.finfo(float).tiny
-    power = max(float(target @ target), smallest)
-    unexplained = float(error @ error)
-    return 1.0 - unexplained / power
-
-
-def _dropped(estimator: Estimator, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
-    """Terms that make up each direction that an estimator dropped."""
-    groups = getattr(estimator, "collinear_groups_", ())
-    dropped = []
-    for group in groups:
-        terms = tuple(names[term] for term in group)
-        dropped.append(terms)
-    return tuple(dropped)
 
 
 def scaled_features(features: Floats) -> tuple[Floats, float]:
     """Features divided by their root mean squares, and their condition number."""
     size = column_rms(features)
-    size[size == 0.0] = 1.0
-    scaled = features / size
-
+    scaled = features / np.where(
+        size > 0.0,
+        size,
+        1.0,
+    )
     singular = np.linalg.svd(scaled, compute_uv=False)
-    largest = singular[0]
-    smallest = singular[-1]
-    rounding = np.finfo(float).eps * largest
-    condition = largest / max(smallest, rounding)
-    return scaled, float(condition)
+    rounding = np.finfo(float).eps * singular[0]
+    return scaled, float(singular[0] / max(singular[-1], rounding))
 
 
 def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
@@ -131,15 +105,10 @@ def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
     power = float(centred @ centred)
     if power == 0.0:
         return ()
-
     most = min(lags, len(values) - 1)
-    correlations = []
-    for lag in range(1, most + 1):
-        later = centred[lag:]
-        earlier = centred[:-lag]
-        product = float(later @ earlier)
-        correlations.append(product / power)
-    return tuple(correlations)
+    return tuple(
+        float(centred[lag:] @ centred[:-lag]) / power for lag in range(1, most + 1)
+    )
 
 
 def correlation_matrix(scaled: Floats) -> Floats:
@@ -173,10 +142,10 @@ def collinear_pairs(
 ) -> tuple[tuple[str, str, float], ...]:
     """Pairs of terms whose correlation is beyond the limit, and the correlation."""
     moment = correlation_matrix(scaled)
-    beyond = np.abs(moment) > COLLINEAR
-    places = np.argwhere(np.triu(beyond, k=1))
-    pairs = []
-    for i, j in places.tolist():
-        correlation = float(moment[i, j])
-        pairs.append((names[i], names[j], correlation))
-    return tuple(pairs)
+    places = np.argwhere(
+        np.triu(
+            np.abs(moment) > COLLINEAR,
+            k=1,
+        )
+    )
+    return tuple((names[i], names[j], float(moment[i, j])) for i, j in places.tolist())

@@ -26,8 +26,10 @@ from identification.samples.prediction import (
 )
 from identification.samples.preprocess import smoothed_channels
 from identification.samples.preprocess.noise import noise_level
-from shipgym import ShipModel, Trial
+from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
+from shipgym.models.simulate import open_loop
+from shipgym.ships import Structure
 from shipgym.trials.resampling import usual_step
 
 FEWEST_TRIALS = 3  # to leave one out and learn something from it
@@ -46,14 +48,6 @@ class PredictionError(NamedTuple):
     noise: float  # variance of the measurement, and of the start that it gives
 
 
-class ErrorSizes(NamedTuple):
-    """Factors on the standard errors at which errors of prediction are of size one."""
-
-    factor: float  # root mean square of those by kind; 0 without any
-    by_kind: dict[str, float]  # of the motion and of indices
-    predicted: int  # number of trials that could be predicted
-
-
 def model_error(
     own: ShipModel,
     left_out: Sequence[ShipModel],
@@ -68,13 +62,17 @@ def model_error(
     covariance shrinks with each trial while the error of the equations does not.
     Returns `factor`, `how` it was found, and what it is made of, for the provenance.
     """
-    n_trials = len(trials)
-    fitted = error_sizes([own] * n_trials, trials)
+    fitted, _ = error_sizes([own] * len(trials), trials)
     error = _generalisation(left_out, trials)
-    if fitted.factor > error["factor"]:
-        error["factor"] = fitted.factor
+    if _common(fitted) > error["factor"]:
+        error["factor"] = _common(fitted)
         error["how"] = "errors on the fitted trials"
-    return {**error, "fitted": fitted.by_kind}
+    return {**error, "fitted": fitted}
+
+
+def _common(sizes: Mapping[str, float]) -> float:
+    """Root mean square of the factors by kind; 0 without any."""
+    return root_mean_square(np.array([*sizes.values()])) if sizes else 0.0
 
 
 def _generalisation(
@@ -86,69 +84,52 @@ def _generalisation(
     over that of the normal distribution. `DEFAULT` where fewer than three can be
     predicted.
     """
-    if len(trials) < FEWEST_TRIALS:
-        return _assumed(f"too few trials to leave one out ({len(trials)})")
-    sizes = error_sizes(left_out, trials)
-    if sizes.predicted < FEWEST_TRIALS:
-        return _assumed(
-            f"only {sizes.predicted} of {len(trials)} trials can be predicted when they"
-            " are left out"
-        )
-    of_normal = 1.96
-    for_few = float(student.ppf(0.975, sizes.predicted)) / of_normal
+    sizes, predicted = error_sizes(left_out, trials[: len(left_out)])
+    if predicted < FEWEST_TRIALS:
+        how = f"assumed: {predicted} of {len(trials)} trials predicted when left out"
+        return {"factor": DEFAULT, "how": how}
+    for_few = float(student.ppf(0.975, predicted)) / 1.96
     return {
-        "factor": max(1.0, for_few * sizes.factor),
+        "factor": max(1.0, for_few * _common(sizes)),
         "how": "trials left out in turn",
-        "trials": sizes.predicted,
+        "trials": predicted,
         "for_few_trials": for_few,
-        **sizes.by_kind,
+        **sizes,
     }
 
 
-def _assumed(why: str) -> dict[str, Any]:
-    return {"factor": DEFAULT, "how": f"assumed: {why}"}
+def error_sizes(
+    models: Sequence[ShipModel], trials: Sequence[Trial]
+) -> tuple[dict[str, float], int]:
+    """Sizes of the errors of models, with covariance, each on its trial.
 
-
-def error_sizes(models: Sequence[ShipModel], trials: Sequence[Trial]) -> ErrorSizes:
-    """Sizes of the errors of models, with covariance, each on its trial."""
-    motion: list[PredictionError] = []
-    indices: list[PredictionError] = []
+    Factors on the standard errors by kind, of the motion and of indices, and the number
+    of trials that could be predicted.
+    """
+    found: dict[str, list[PredictionError]] = {"motion": [], "indices": []}
     predicted = 0
     for model, trial in zip(models, trials, strict=True):
         clean = _smoothed(trial)
         own = replace(model, covariance=None)
         drawn = model.sample(DRAWS, 0)
-        errors = motion_errors(own, drawn, trial, clean)
+        errors = motion_errors(
+            own,
+            drawn,
+            trial,
+            clean,
+        )
         if errors:
             predicted += 1
-            motion += errors
-            indices += index_errors(own, drawn, trial, clean)
-
-    by_kind = dict[str, float]()
-    if motion:
-        by_kind["motion"] = scale_of(motion)
-    if indices:
-        by_kind["indices"] = scale_of(indices)
-    return ErrorSizes(
-        factor=_common_factor(by_kind),
-        by_kind=by_kind,
-        predicted=predicted,
-    )
-
-
-def _common_factor(by_kind: Mapping[str, float]) -> float:
-    """Root mean square of the factors by kind; 0 without any."""
-    if not by_kind:
-        return 0.0
-    sizes = np.array(list(by_kind.values()))
-    return root_mean_square(sizes)
+            found["motion"] += errors
+            found["indices"] += index_errors(own, drawn, trial, clean)
+    sizes = {kind: scale_of(errors) for kind, errors in found.items() if errors}
+    return sizes, predicted
 
 
 def _smoothed(trial: Trial) -> Trial:
     """The trial that extremes are read from."""
     names = [name for name in COMPARED if name in trial]
-    channels = smoothed_channels(trial, names, "spline")
-    return trial.with_channels(channels)
+    return trial.with_channels(smoothed_channels(trial, names, "spline"))
 
 
 def scale_of(errors: Sequence[PredictionError]) -> float:
@@ -189,26 +170,29 @@ def motion_errors(
 
     names = counted_channels(own, trial)
     levels = {name: noise_level(trial.t, trial[name]) for name in names}
-    from_shifted = _from_shifted_starts(own, clean, levels)
-    by_rudder = _with_noisy_rudder(own, clean)
+    # smoothing leaves the start known to half the noise of a channel
+    shifted = _runs(
+        [
+            (own, clean.with_channels({name: clean[name] + 0.5 * level}))
+            for name, level in levels.items()
+            if level
+        ]
+    )
+    noisy = _with_noisy_rudder(own, clean)
     # where the heading is differentiated, jitter of the clock is in its noise already
     timing = 0.0 if "r" in trial.derived else _timing(trial)
     found = []
     for name, level in levels.items():
         mine = predicted[name]
-        variance = _mean_variance(runs, name, mine)
+        scatter = np.array([run[name] for run in runs]) - mine
+        variance = float(np.mean(_robust_variance(scatter)))
         if variance <= 0.0:
             continue
-        by_start = [mean_square(run[name] - mine) for run in from_shifted]
-        by_noise = [mean_square(run[name] - mine) for run in by_rudder]
-        slope = np.gradient(clean[name], clean.t)
-        by_timing = mean_square(timing * slope)
-        error = PredictionError(
-            square=mean_square(mine - trial[name]),
-            variance=variance,
-            noise=level**2 + by_timing + sum(by_start) + sum(by_noise) / RUDDERS,
-        )
-        found.append(error)
+        noise = level**2 + mean_square(timing * np.gradient(clean[name], clean.t))
+        noise += sum(mean_square(run[name] - mine) for run in shifted)
+        noise += sum(mean_square(run[name] - mine) for run in noisy) / RUDDERS
+        square = mean_square(mine - trial[name])
+        found.append(PredictionError(square, variance, noise))
     return found
 
 
@@ -225,13 +209,6 @@ def counted_channels(model: ShipModel, trial: Trial) -> list[str]:
     return names
 
 
-def _mean_variance(runs: Sequence[Trial], name: str, mine: Floats) -> float:
-    """Variance of a channel of the draws about the own prediction, mean over time."""
-    scatter = np.array([run[name] for run in runs]) - mine
-    variance = _robust_variance(scatter)
-    return float(np.mean(variance))
-
-
 def _runs(cases: Sequence[tuple[ShipModel, Trial]]) -> list[Trial]:
     """Predictions of trials by models, of those that do not run away."""
     runs = []
@@ -240,23 +217,6 @@ def _runs(cases: Sequence[tuple[ShipModel, Trial]]) -> list[Trial]:
         if run is not None:
             runs.append(run)
     return runs
-
-
-def _from_shifted_starts(
-    own: ShipModel,
-    clean: Trial,
-    levels: dict[str, float],
-) -> list[Trial]:
-    """Predictions from starts off by half the noise of a channel.
-
-    Smoothing leaves the start known to that.
-    """
-    cases = []
-    for name, level in levels.items():
-        if level:
-            shifted = clean.with_channels({name: clean[name] + 0.5 * level})
-            cases.append((own, shifted))
-    return _runs(cases)
 
 
 def _with_noisy_rudder(own: ShipModel, clean: Trial) -> list[Trial]:
@@ -307,32 +267,17 @@ def index_errors(
         ]
     found = []
     for name in names:
-        truth = getattr(measured, name, None)
-        mine = getattr(predicted, name, None)
-        if truth is None or mine is None:
+        truth, mine, *others = [
+            getattr(one, name, None) for one in (measured, predicted, *draws)
+        ]
+        values = [value for value in others if value is not None]
+        if truth is None or mine is None or len(values) < DRAWS / 2:
             continue
-        variance = _index_variance(draws, name, mine)
+        variance = float(_robust_variance(np.array(values) - mine))
         if variance > 0.0:
-            error = PredictionError(
-                square=(truth - mine) ** 2,
-                variance=variance,
-                noise=_reading_noise(trial, name, own),
-            )
-            found.append(error)
+            noise = _reading_noise(trial, name, own)
+            found.append(PredictionError((truth - mine) ** 2, variance, noise))
     return found
-
-
-def _index_variance(draws: Sequence[Any], name: str, mine: float) -> float:
-    """Variance of an index of the draws about the own one; 0 where most have none."""
-    values = []
-    for indices in draws:
-        value = getattr(indices, name, None)
-        if value is not None:
-            values.append(value)
-    if len(values) < DRAWS / 2:
-        return 0.0
-    scatter = np.array(values) - mine
-    return float(_robust_variance(scatter))
 
 
 def _timing(trial: Trial) -> float:
@@ -342,19 +287,37 @@ def _timing(trial: Trial) -> float:
 
 def _reading_noise(trial: Trial, index: str, model: ShipModel) -> float:
     """Variance of an index as it is read from samples, by noise and timing."""
-    timing = _timing(trial)
+    noise, fastest, unit = 0.0, trial["u"].max(), model.particulars["length"]
     if index.endswith("_deg"):
         noise = noise_level(trial.t, trial["psi"])
-        fastest = float(np.abs(trial["r"]).max())
-        by_timing = timing * fastest
-        error = np.hypot(noise, by_timing)
-        return float(np.degrees(error)) ** 2
-
-    noise = 0.0
-    if "x" in trial and trial.kind != "zigzag":
+        fastest, unit = np.abs(trial["r"]).max(), math.radians(1.0)
+    elif "x" in trial and trial.kind != "zigzag":
         noise = noise_level(trial.t, trial["x"])
-    fastest = trial["u"].max()
-    by_timing = timing * fastest
-    error = np.hypot(noise, by_timing)
-    length = model.particulars["length"]
-    return float(error / length) ** 2
+    return float(np.hypot(noise, _timing(trial) * fastest) / unit) ** 2
+
+
+def with_sound_draws(model: ShipModel, trials: Sequence[Trial]) -> ShipModel:
+    """The model, with draws where some of its covariance run away in its own trials.
+
+    The log itself rejects those: no such ship sailed it. The covariance stays.
+    """
+
+    def sails(draw: ShipModel) -> bool:
+        try:
+            for trial in trials:
+                open_loop(draw, trial)
+        except UnstableModelError:
+            return False
+        return True
+
+    if type(model.dynamics) is not Structure:
+        return model
+    whole = model.sample(128, 0)
+    drawn = [draw for draw in whole if sails(draw)]
+    if not 0.5 * len(whole) <= len(drawn) < len(whole):
+        return model
+    draws = [
+        [float(f"{value:.8g}") for value in draw.coefficients.values()]
+        for draw in drawn
+    ]
+    return replace(model, draws=np.array(draws))

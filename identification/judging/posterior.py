@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from identification.arrays import by_name
 from identification.judging.coarsened import CoarsenedPosterior
 from identification.judging.model_error import FEWEST_TRIALS, model_error
 from identification.judging.sampling import (
-    Chains,
     LogDensity,
     Mixing,
     mixing_of,
@@ -28,30 +26,17 @@ from shipgym.manoeuvres.execution import usual_rudder
 
 def check_trials(trials: Sequence[Trial]) -> None:
     """Refuse trials too few or too alike to tell how much their likelihood counts."""
-    n_trials = len(trials)
-    if n_trials < FEWEST_TRIALS:
+    kinds = {
+        (trial.kind, round(float(np.degrees(usual_rudder(trial)))), _first_side(trial))
+        for trial in trials
+    }
+    if len(trials) < FEWEST_TRIALS or len(kinds) == 1:
         raise InputError(
             f"uncertainty: expected at least {FEWEST_TRIALS} trials to fit for a"
-            " posterior, whose likelihood counts by how trials left out in turn are"
-            f" predicted, got {n_trials}; add trials, or choose 'analytic'"
+            " posterior, which differ in kind, rudder angle or side, so that one left"
+            f" out tells something, got {len(trials)}{' alike' * (len(kinds) == 1)};"
+            " add trials, or choose 'analytic'"
         )
-    first = trials[0]
-    if all(_alike(first, trial) for trial in trials[1:]):
-        angle = np.degrees(usual_rudder(first))
-        raise InputError(
-            "uncertainty: expected trials that differ in kind, rudder angle or side for"
-            f" a posterior, got {n_trials} alike ({first.kind or 'trials'} with"
-            f" {angle:.0f} deg to the same side first), of which one left out tells"
-            " nothing; add another trial, or choose 'analytic'"
-        )
-
-
-def _alike(one: Trial, other: Trial) -> bool:
-    """Whether two trials are the same manoeuvre to a degree and begin to one side."""
-    angles = np.degrees([usual_rudder(one), usual_rudder(other)])
-    same_angle = abs(angles[0] - angles[1]) <= 1.0
-    same_side = _first_side(one) == _first_side(other)
-    return bool(one.kind == other.kind and same_angle and same_side)
 
 
 def _first_side(trial: Trial) -> float:
@@ -71,7 +56,11 @@ def table_prior(model: ShipModel) -> CoefficientPrior:
     mean = np.array(list(model.coefficients.values()))
     covariance = np.asarray(model.covariance)
     deviations = np.sqrt(np.diag(covariance))
-    units = np.where(deviations > 0.0, deviations, 1.0)
+    units = np.where(
+        deviations > 0.0,
+        deviations,
+        1.0,
+    )
     correlations = covariance / np.outer(units, units)
     values, vectors = np.linalg.eigh(correlations)
     kept = values > 1e-9 * values.max()
@@ -118,16 +107,14 @@ def with_posterior(
     if not mixing.is_enough:
         remarks.append(_not_mixed(mixing))
     else:
-        points = chains.points.reshape(-1, prior.n_parameters)
-        model = _with_draws(model, prior, points, asked.seed)
+        points = chains.reshape(-1, prior.n_parameters)
+        model = _with_draws(model, prior, points)
     return model, {
         "kept": mixing.is_enough,
         "prior": prior.source,
         "power": posterior.power,
         "left_out": error,
-        "parameters": prior.n_parameters,
         **mixing.plain(),
-        "error_scales": by_name(whole.channels, posterior.scales),
         "remarks": remarks,
     }
 
@@ -141,17 +128,21 @@ def _begun(part: Segment, model: ShipModel, trial: Trial) -> Segment:
     for column, name in enumerate(model.state_names):
         if name in ("psi", *"uvr"):
             start[column] = begun[name][0]
-    return replace(part, start=start)
+    return replace(
+        part,
+        start=start,
+    )
 
 
 def _point_of(model: ShipModel, prior: CoefficientPrior) -> Floats:
     """The point of a model's coefficients."""
-    values = np.array(list(model.coefficients.values()))
-    units = prior.deviations
-    known = units > 0.0
-    scaled_root = prior.root[known] / units[known, None]
-    off = (values - prior.mean)[known] / units[known]
-    point, *_ = np.linalg.lstsq(scaled_root, off, rcond=1e-12)
+    off = np.array(list(model.coefficients.values())) - prior.mean
+    units = np.where(prior.deviations > 0.0, prior.deviations, 1.0)
+    point, *_ = np.linalg.lstsq(
+        prior.root / units[:, None],
+        off / units,
+        rcond=1e-12,
+    )
     return np.asarray(point)
 
 
@@ -188,26 +179,23 @@ def coarsened(
     return posterior, error
 
 
-def _chains(posterior: CoarsenedPosterior, start: Floats, asked: Uncertainty) -> Chains:
-    """Points of the posterior that walkers went through."""
+def _chains(posterior: CoarsenedPosterior, start: Floats, asked: Uncertainty) -> Floats:
+    """Points that walkers went through, shape (n_steps, n_walkers, n_parameters)."""
     shape = posterior.map(posterior.mode(start))
 
     def log_density(coordinates: Floats) -> Floats:
         return posterior.log_density(shape.points(coordinates))
 
-    rng = np.random.default_rng(asked.seed)
+    rng = np.random.default_rng(0)
     walkers = _walkers(log_density, len(start), rng)
-    chains = sample(log_density, walkers, asked.steps, asked.seed)
-    points = shape.points(chains.points.reshape(-1, len(start)))
-    return chains._replace(points=points.reshape(chains.points.shape))
+    chains = sample(log_density, walkers, asked.steps)
+    return shape.points(chains.reshape(-1, len(start))).reshape(chains.shape)
 
 
-def _with_draws(
-    model: ShipModel, prior: CoefficientPrior, points: Floats, seed: int
-) -> ShipModel:
+def _with_draws(model: ShipModel, prior: CoefficientPrior, points: Floats) -> ShipModel:
     """The model with the covariance of points of the posterior, and some of them."""
     n_draws = 256
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     chosen = rng.choice(len(points), n_draws, replace=False)
     chosen.sort()
     of_points = np.atleast_2d(np.cov(points.T))
@@ -226,24 +214,17 @@ def _walkers(
     They are chosen among five times as many normal points by what these weigh in the
     density (sampling importance resampling, Rubin 1988).
     """
-    whole_batches = 128
-    fewest = 2 * n_parameters
-    batches = math.ceil(fewest / whole_batches)
-    n_walkers = whole_batches * batches
-    n_points = 5 * n_walkers
-    points = rng.standard_normal((n_points, n_parameters))
+    n_walkers = 128 * math.ceil(2 * n_parameters / 128)
+    points = rng.standard_normal((5 * n_walkers, n_parameters))
     points[0] = 0.0  # the mode
-
-    squares = np.sum(points**2, axis=1)
-    log_weights = log_density(points) + 0.5 * squares
+    log_weights = log_density(points) + 0.5 * np.sum(
+        points**2,
+        axis=1,
+    )
     # the largest of log weights and Gumbel numbers are a draw without replacement
-    chances = rng.gumbel(size=n_points)
-    order = np.argsort(log_weights + chances)
-    best = order[-n_walkers:]
-    chosen = points[best]
-    values = log_density(chosen)
-    finite = np.isfinite(values)
-    chosen[~finite] *= 0.01
+    order = np.argsort(log_weights + rng.gumbel(size=len(points)))
+    chosen = points[order[-n_walkers:]]
+    chosen[~np.isfinite(log_density(chosen))] *= 0.01
     return np.asarray(chosen)
 
 
@@ -254,39 +235,29 @@ def contradictions(whole: Sailed, point: Floats) -> list[str]:
     likelihood counts for less, a narrow prior would hide that it is wrong.
     """
     prior = whole.prior
-    deviations = prior.deviations
-    known = deviations > 0.0
-    values = prior.coefficients(point[None])[0]
-    off = np.zeros(len(values))
-    off[known] = (values - prior.mean)[known] / deviations[known]
+    off = prior.coefficients(point[None])[0] - prior.mean
+    off /= np.where(
+        prior.deviations > 0.0,
+        prior.deviations,
+        np.inf,
+    )
     worst = int(np.abs(off).argmax())
-    limit = 3.0
-    if abs(off[worst]) <= limit:
+    if abs(off[worst]) <= 3.0:
         return []
     name = list(whole.blank.coefficients)[worst]
     return [
-        f"prior: expected coefficients within {limit:g} standard deviations of the"
-        f" prior ({prior.source}), got {name} {off[worst]:+.1f} from its mean by the"
-        " trials; check the particulars, or choose another prior"
+        "prior: expected coefficients within 3 standard deviations of the prior"
+        f" ({prior.source}), got {name} {off[worst]:+.1f} from its mean by the trials;"
+        " check the particulars, or choose another prior"
     ]
 
 
 def _not_mixed(mixing: Mixing) -> str:
     """A remark on walkers that did not mix."""
-    fewest = mixing.fewest_times
-    steps = mixing.steps
-    time = mixing.autocorrelation_time
-    needed = 2.0 * fewest * time
-    hundreds = math.ceil(needed / 100.0)
-    more = max(100 * hundreds, 2 * steps)
-    wanted = (
-        f"{fewest:g} autocorrelation times and a split R-hat up to"
-        f" {mixing.largest_r_hat:g}"
-    )
-    found = f"{steps} steps of {time:.0f} each and {mixing.r_hat:.2f}"
     return (
-        f"posterior: expected walkers that mix, {wanted}, got {found}; the covariance"
-        f" is kept: try uncertainty.steps = {more}"
+        f"posterior: the walkers did not mix in {mixing.steps} steps (autocorrelation"
+        f" time {mixing.autocorrelation_time:.0f}, split R-hat {mixing.r_hat:.2f}); the"
+        f" covariance is kept: try uncertainty.steps = {4 * mixing.steps}"
     )
 
 

@@ -98,4 +98,8 @@ def _second_differences(
         bends = 0.5 * (both - single[first] - single[second])
     squared = first == second
     bends[squared] = 0.5 * single
-    return np.nan_to_num(bends, posinf=0.0, neginf=0.0)
+    return np.nan_to_num(
+        bends,
+        posinf=0.0,
+        neginf=0.0,
+    )

@@ -5,7 +5,7 @@ quite symmetric look the same: a constant moment, which a structure without one 
 where the bias differs from zero.
 """
 
-from collections.abc import Sequence
+import math
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -103,35 +103,36 @@ def has_constant(dynamics: Any) -> bool:
     if not isinstance(dynamics, Structure):
         return False
     sides = {"v", "r", "p", "phi", "delta"}
-    terms = list[Term]()
-    for equation in ("v", "r", "q"):
-        terms += dynamics.equations.get(equation, ())
-    for term in terms:
-        symbols = {symbol.strip("|") for symbol in term.symbols}
-        if not symbols & sides:
-            return True
-    return False
+    return any(
+        not {symbol.strip("|") for symbol in term.symbols} & sides
+        for equation in ("v", "r", "q")
+        for term in dynamics.equations.get(equation, ())
+    )
 
 
 def _of_model(model: ShipModel, in_model: bool) -> RudderBias:
     """Neutral rudder of a model, its error by the covariance of its coefficients."""
-    neutral = straight_running(model).rudder
     values = np.array(list(model.coefficients.values()))
+    neutral = _neutral(model, values)
     covariance = np.asarray(model.covariance)
     steps = 0.01 * np.sqrt(np.diag(covariance))
     slopes = np.zeros_like(values)
     for place in np.flatnonzero(steps):
         moved = values.copy()
         moved[place] += steps[place]
-        changed = straight_running(model.with_coefficients(moved)).rudder
-        slopes[place] = (changed - neutral) / steps[place]
-    variance = float(slopes @ covariance @ slopes)
+        slopes[place] = (_neutral(model, moved) - neutral) / steps[place]
+    error = math.sqrt(max(float(slopes @ covariance @ slopes), 0.0))
     return RudderBias(
-        angle_deg=float(np.degrees(neutral)),
-        standard_error_deg=float(np.degrees(np.sqrt(max(variance, 0.0)))),
+        angle_deg=math.degrees(neutral),
+        standard_error_deg=math.degrees(error),
         in_model=in_model,
         structure=model.structure,
     )
+
+
+def _neutral(model: ShipModel, values: Floats) -> float:
+    """Rudder of a straight course by other coefficients, rad."""
+    return straight_running(model.with_coefficients(values)).rudder
 
 
 def _of_companion(problem: Problem) -> RudderBias:
@@ -152,21 +153,18 @@ def _of_companion(problem: Problem) -> RudderBias:
     )
     n_trials = len(problem.used)
     if n_trials < FEWEST_TRIALS:
-        of_residuals = joint_covariance(estimators, samples, blank.travel_time)
+        of_residuals = joint_covariance(
+            estimators,
+            samples,
+            blank.travel_time,
+        )
         covariance = DEFAULT**2 * of_residuals
     else:
-        left_out = []
-        for trial in range(n_trials):
-            without, _ = without_trials(estimators, samples, [trial])
-            left_out.append(without["r"].coef_)
-        covariance = _jackknife(left_out)
+        left_out = [
+            without_trials(estimators, samples, [trial])[0]["r"].coef_
+            for trial in range(n_trials)
+        ]
+        scatter = left_out - np.mean(left_out, axis=0)
+        covariance = (n_trials - 1) / n_trials * (scatter.T @ scatter)
     model = with_coefficients(blank, estimators)
     return _of_model(replace(model, covariance=covariance), in_model=False)
-
-
-def _jackknife(left_out: Sequence[Floats]) -> Floats:
-    """Covariance of coefficients from those without each of the trials."""
-    n_trials = len(left_out)
-    scatter = np.array(left_out) - np.mean(left_out, axis=0)
-    inflation = (n_trials - 1) / n_trials
-    return np.asarray(inflation * (scatter.T @ scatter))

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import emcee
 import numpy as np
@@ -23,9 +23,7 @@ class Mixing:
     #: autocorrelation times that chains that mixed last
     fewest_times: ClassVar[float] = 5.0
 
-    walkers: int
     steps: int  # after the warm-up
-    acceptance: float  # share of the moves that were taken
     autocorrelation_time: float  # integrated, steps
     r_hat: float  # split R-hat
     effective_samples: float
@@ -41,37 +39,33 @@ class Mixing:
         return asdict(self)
 
 
-class Chains(NamedTuple):
-    """Points that the walkers went through after the warm-up."""
-
-    points: Floats  # shape (n_steps, n_walkers, n_parameters)
-    acceptance: float  # share of the moves that were taken
-
-
-def sample(log_density: LogDensity, start: Floats, steps: int, seed: int) -> Chains:
+def sample(log_density: LogDensity, start: Floats, steps: int) -> Floats:
     """Points of a density from steps of walkers, after half as many to warm up.
 
-    `start` are the walkers, shape (n_walkers, n_parameters), at least twice as many as
-    parameters. A quarter of the moves is differential evolution (ter Braak 2006,
-    Statistics and Computing 16), the others are `autoregression` about the points of
-    the last stage of the warm-up.
+    Shape (n_steps, n_walkers, n_parameters). `start` are the walkers, shape (n_walkers,
+    n_parameters), at least twice as many as parameters. A quarter of the moves is
+    differential evolution (ter Braak 2006, Statistics and Computing 16), the others are
+    `autoregression` about the points of the last stage of the warm-up.
     """
     walkers, near = start, start
-    state = np.random.RandomState(seed).get_state()
+    state = np.random.RandomState(0).get_state()
     for share in (0.1, 0.15, 0.25, 1.0):
         n_steps = max(int(share * steps), 2)
         moves = [(emcee.moves.DEMove(), 0.25), (autoregression(near), 0.75)]
         sampler = emcee.EnsembleSampler(
             *start.shape, log_density, moves=moves, vectorize=True
         )
-        last = emcee.State(walkers, random_state=state)
+        last = emcee.State(
+            walkers,
+            random_state=state,
+        )
         parts = [len(part) for part in np.array_split(range(n_steps), min(10, n_steps))]
         for n_part in counted("posterior", parts):
             last = sampler.run_mcmc(last, n_part)
         walkers, state = last.coords, last.random_state
         near = sampler.get_chain(discard=n_steps // 2, flat=True)
-    acceptance = float(sampler.acceptance_fraction.mean())
-    return Chains(sampler.get_chain(), acceptance)
+    found: Floats = sampler.get_chain()
+    return found
 
 
 def autoregression(points: Floats) -> Any:
@@ -99,17 +93,14 @@ def autoregression(points: Floats) -> Any:
     return emcee.moves.MHMove(propose)
 
 
-def mixing_of(chains: Chains) -> Mixing:
-    """Diagnostics of chains of at least four steps."""
-    points = chains.points
+def mixing_of(points: Floats) -> Mixing:
+    """Diagnostics of chains of at least four steps, as `sample` gives them."""
     steps, walkers, _ = points.shape
     with np.errstate(invalid="ignore"):  # of walkers that never moved
         times = emcee.autocorr.integrated_time(points, tol=0, quiet=True)
     time = float(np.nan_to_num(times, nan=steps).max())
     return Mixing(
-        walkers=walkers,
         steps=steps,
-        acceptance=chains.acceptance,
         autocorrelation_time=max(time, 1.0),
         r_hat=float(split_r_hat(points).max()),
         effective_samples=steps * walkers / max(time, 1.0),
@@ -123,8 +114,14 @@ def split_r_hat(points: Floats) -> Floats:
     n_walkers, n_parameters).
     """
     half = len(points) // 2
-    chains = np.concatenate([points[:half], points[half : 2 * half]], axis=1)
-    within = chains.var(axis=0, ddof=1).mean(axis=0)
+    chains = np.concatenate(
+        [points[:half], points[half : 2 * half]],
+        axis=1,
+    )
+    within = chains.var(
+        axis=0,
+        ddof=1,
+    ).mean(axis=0)
     between = chains.mean(axis=0).var(axis=0, ddof=1)
     ratio = between / np.maximum(within, np.finfo(float).tiny)
     return np.asarray(np.sqrt((half - 1.0) / half + ratio))

@@ -7,19 +7,18 @@ so much that the others would not count otherwise. Errors are taken to be correl
 over the time to sail one ship length.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 
 from identification.arrays import root_mean_square
-from identification.judging.extrapolation import largest_rudders
+from identification.judging.extrapolation import hardest
 from identification.models.sailed import least_scales
 from identification.samples.prediction import predict
 from identification.samples.preprocess import noise_level
 from shipgym import ShipModel, Trial
-from shipgym.arrays import Floats, Integers
 from shipgym.trials.resampling import usual_step
 
 #: Of few coefficients, those with the bias of the rudder last; by the simulated motion
@@ -27,9 +26,6 @@ from shipgym.trials.resampling import usual_step
 RESPONSES = ("nomoto", "norrbin", "nomoto-bias", "norrbin-bias")
 #: Ship lengths of a piece of a trial at least.
 PIECE = 5.0
-
-#: Metrics of trials by their names, see `prediction.trial_metrics`.
-Metrics = Mapping[str, Mapping[str, Any]]
 
 
 class Fitted(Protocol):
@@ -94,26 +90,25 @@ def fit_name(structure: str, method: str) -> str:
 def rank_by_likelihood(structure: str, method: str, fit: Fitted) -> RankedFit:
     """Rank of a fit, by what it predicts of its own trials, each left out in turn."""
     trials = fit.problem.used
+    groups = [np.array([place]) for place in range(len(trials))]
+    largest = hardest(trials)  # what a hard turn is to trials of less rudder
+    if largest.size:
+        groups.append(largest)
     runs = list[tuple[Trial, Trial | None]]()
-    for group in _groups(trials):
+    for group in groups:
         model = fit.without(group.tolist())
         runs += [(trials[place], predict(model, trials[place])) for place in group]
 
     windy = in_wind(trials)
     losses: dict[str, list[float]] = {trial.name: [] for trial in trials}
-    sizes = list[dict[str, float]]()
+    sizes: dict[str, list[float]] = {}
     for trial, run in runs:
-        errors = Errors(fit.model, trial, windy)
-        for piece in errors.pieces():
-            found = errors.sizes(run, piece)
-            losses[trial.name].append(float(np.mean(np.log(list(found.values())))))
-            sizes.append(found)
+        found = piece_errors(fit.model, trial, run, windy)
+        losses[trial.name] += np.mean(np.log([*found.values()]), axis=0).tolist()
+        for name, own in found.items():
+            sizes.setdefault(name, []).extend(own)
     of_pieces = [loss for found in losses.values() for loss in found]
     known = [(trial, run) for trial, run in runs if run is not None]
-    scales = {
-        name: float(np.median([one[name] for one in sizes if name in one]))
-        for name in dict.fromkeys(name for one in sizes for name in one)
-    }
     return RankedFit(
         structure=structure,
         method=method,
@@ -123,22 +118,10 @@ def rank_by_likelihood(structure: str, method: str, fit: Fitted) -> RankedFit:
         loss=float(np.mean(of_pieces)),
         heading_deg=_mean_error_deg("psi", known),
         yaw_rate_deg_s=_mean_error_deg("r", known),
-        scales=scales,
+        scales={name: float(np.median(own)) for name, own in sizes.items()},
         losses={name: float(np.mean(found)) for name, found in losses.items()},
         of_pieces=tuple(of_pieces),
     )
-
-
-def _groups(trials: Sequence[Trial]) -> list[Integers]:
-    """Places of the trials that are left out together: each, and the largest rudders.
-
-    These are what a hard turn is to trials of less rudder.
-    """
-    groups = [np.array([place]) for place in range(len(trials))]
-    largest = largest_rudders(trials)
-    if largest.size:
-        groups.append(largest)
-    return groups
 
 
 def _mean_error_deg(name: str, runs: Sequence[tuple[Trial, Trial]]) -> float | None:
@@ -156,62 +139,43 @@ def in_wind(trials: Sequence[Trial]) -> bool:
     return any("wind_rdot" in trial for trial in trials)
 
 
-class Errors:
-    """Errors of predictions of a trial by their noise.
+def piece_errors(
+    model: ShipModel, trial: Trial, run: Trial | None, windy: bool
+) -> dict[str, list[float]]:
+    """Errors of a prediction by the noise, at least 1, by channel and piece of a trial.
 
     Compared are position, speed, heading and yaw rate, as far as they were measured: a
     yaw rate that is the derivative of the heading says nothing new. What a structure
-    has no equation of stays as it began, and its whole change is an error.
+    has no equation of stays as it began, and its whole change is an error. A prediction
+    that ran away is ten times as wrong as no change at all.
 
     What is left of the moment of the wind makes heading and track of a gentle zigzag
     drift, and hardly matters in a turn: in wind the heading is compared by how far the
     ship turns in one ship length, and the position not at all.
     """
-
-    def __init__(self, model: ShipModel, trial: Trial, windy: bool) -> None:
-        self.trial = trial
-        self.steps = max(round(model.travel_time / usual_step(trial.t)), 1)
-        measured = trial.channels.keys() - trial.derived
-        names = [name for name in ("psi", "r", "u") if name in trial]
-        if "r" in trial.derived and "psi" in names:
-            names.remove("r")
-        if {"x", "y"} <= measured and not windy:
-            names += ["x", "y"]
-        self.lag = min(self.steps, len(trial) - 1) if windy else 0
-        length = model.particulars["length"]
-        least = dict(zip("uvr", least_scales(model, "uvr"), strict=True))
-        least |= {"psi": np.radians(0.1), "x": 0.01 * length, "y": 0.01 * length}
-        self.noises = {
-            name: max(noise_level(trial.t, trial[name]), least[name]) for name in names
-        }
-
-    def pieces(self) -> list[slice]:
-        """Samples of pieces of the trial of some ship lengths."""
-        n_pieces = max(int(len(self.trial) / (PIECE * self.steps)), 1)
-        edges = np.linspace(0, len(self.trial), n_pieces + 1).astype(int)
-        return [slice(*edges[k : k + 2]) for k in range(n_pieces)]
-
-    def sizes(self, run: Trial | None, piece: slice) -> dict[str, float]:
-        """Root mean square errors in a piece by their noise, at least 1, by channel.
-
-        A prediction that ran away is ten times as wrong as no change at all.
-        """
-        found = {}
-        for name, noise in self.noises.items():
-            values = self.trial[name]
-            if run is None:
-                error = 10.0 * max(float(np.std(values)), noise)
-            else:
-                error = root_mean_square(self._error(name, run[name] - values, piece))
-            found[name] = max(error / noise, 1.0)
-        return found
-
-    def _error(self, name: str, error: Floats, piece: slice) -> Floats:
-        if name != "psi" or not self.lag:
-            return error[piece]
-        change = error[self.lag :] - error[: -self.lag]
-        within = change[piece]
-        return within if len(within) else change
+    steps = max(round(model.travel_time / usual_step(trial.t)), 1)
+    n_pieces = max(int(len(trial) / (PIECE * steps)), 1)
+    length = model.particulars["length"]
+    least = dict(zip("uvr", least_scales(model, "uvr"), strict=True))
+    least |= {"psi": np.radians(0.1), "x": 0.01 * length, "y": 0.01 * length}
+    measured = trial.channels.keys() - trial.derived
+    names = [name for name in ("psi", "u") if name in trial]
+    if "r" in trial and not ("r" in trial.derived and "psi" in trial):
+        names.append("r")
+    if {"x", "y"} <= measured and not windy:
+        names += ["x", "y"]
+    found = {}
+    for name in names:
+        values = trial[name]
+        noise = max(noise_level(trial.t, values), least[name])
+        error = np.full(len(trial), 10.0 * max(float(np.std(values)), noise))
+        if run is not None:
+            error = run[name] - values
+            if windy and name == "psi" and steps < len(trial):
+                error = error[steps:] - error[:-steps]
+        pieces = np.array_split(error, n_pieces)
+        found[name] = [max(root_mean_square(own) / noise, 1.0) for own in pieces]
+    return found
 
 
 def simplest(ranked: Sequence[RankedFit]) -> RankedFit:

@@ -5,8 +5,6 @@ from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Any
 
-from identification.samples.velocities import SIGNIFICANT
-from shipgym.manoeuvres.quantiles import NORMAL_95
 from shipgym.trials.navigation import set_and_drift
 
 
@@ -25,10 +23,7 @@ def error_source(provenance: Mapping[str, Any]) -> str:
     if posterior and posterior["kept"]:
         return (
             "a posterior by sampling (likelihood to the power"
-            f" {posterior['power']:.2g}, {posterior['walkers']} walkers,"
-            f" {posterior['steps']} steps, acceptance {posterior['acceptance']:.2f},"
-            f" autocorrelation time {posterior['autocorrelation_time']:.0f} steps,"
-            f" split R-hat {posterior['r_hat']:.3f},"
+            f" {posterior['power']:.2g}, split R-hat {posterior['r_hat']:.3f},"
             f" {posterior['effective_samples']:.0f} effective samples)"
         )
     source = "the residuals of the fit, correlated in time and between the equations"
@@ -40,102 +35,52 @@ def error_source(provenance: Mapping[str, Any]) -> str:
 
 def turn_sentences(provenance: Mapping[str, Any]) -> list[str]:
     """What holds a hard turn of a model, by its provenance, and within how much."""
-    sentences = []
     error = provenance.get("model_error", {}).get("hard_turn")
-    if error:
-        percent = 100.0 * error["size"]
-        sentences.append(
-            "No trial turns through half a circle: the angle of a hard turn is taken"
-            f" to be known to {percent:.0f} % (standard error; {error['how']}). A turn"
-            " at full rudder would show it."
-        )
-    return sentences
+    if not error:
+        return []
+    return [
+        "No trial turns through half a circle: the angle of a hard turn is taken to be"
+        f" known to {100.0 * error['size']:.0f} % (standard error; {error['how']}). A"
+        " turn at full rudder would show it."
+    ]
 
 
 def bias_sentences(bias: dict[str, Any] | None) -> list[str]:
     """The bias in words; none where there is none."""
     if bias is None:
         return []
-    angle, error = bias["angle_deg"], bias["standard_error_deg"]
-    side = "starboard" if angle > 0.0 else "port"
-    margin = 1.96 * error
-    found = (
-        f"Rudder bias: the ship runs straight with {abs(angle):.2g} ± {margin:.2g} deg"
-        f" (95 %) to {side}"
-    )
-    if not bias["significant"]:
-        return [f"{found}, which does not differ from zero."]
-    if bias["in_model"]:
-        return [f"{found}; the model has it."]
-    structure = bias["structure"]
+    side = "starboard" if bias["angle_deg"] > 0.0 else "port"
+    verdict = "which does not differ from zero"
+    if bias["significant"]:
+        verdict = "the model has it" if bias["in_model"] else "by norrbin-bias"
     return [
-        f"{found}, by {structure}; the structure has no constant for it: it belongs to"
-        f" the rudder's zero, or take structure {structure!r}."
+        f"Rudder bias: the ship runs straight with {abs(bias['angle_deg']):.2g} ±"
+        f" {1.96 * bias['standard_error_deg']:.2g} deg (95 %) to {side}; {verdict}."
     ]
 
 
 def sea_sentences(provenance: Mapping[str, Any]) -> list[str]:
-    """Current and wind of the trials, by the provenance of a model, in words."""
-    sentences = list[str]()
-    if "currents" in provenance:
-        sentences += _current_sentences(provenance["currents"])
+    """Current and wind of the trials, by the provenance of a model, in words.
+
+    Trials of the same current stand together.
+    """
+    trials_of = defaultdict[str, list[str]](list)
+    for trial, row in provenance.get("currents", {}).items():
+        trials_of[current_text(row)].append(PurePath(trial).name)
+    sentences = [f"{', '.join(names)}: {text}" for text, names in trials_of.items()]
     if "wind" in provenance:
-        wind = provenance["wind"]
-        speeds = wind["mean_speeds"].values()
-        low = min(speeds)
-        high = max(speeds)
+        speeds = provenance["wind"]["mean_speeds"].values()
         sentences.append(
-            f"wind of {low:.2g} to {high:.2g} m/s on average: its forces are removed"
+            f"wind of {min(speeds):.2g} to {max(speeds):.2g} m/s on average: its forces"
+            " are removed"
         )
     return sentences
 
 
-def _current_sentences(currents: Mapping[str, Any]) -> list[str]:
-    """Trials of the same current together."""
-    trials_of = defaultdict[str, list[str]](list)
-    for trial, row in currents.items():
-        text = current_text(row)
-        name = PurePath(trial).name
-        trials_of[text].append(name)
-
-    sentences = []
-    for text, names in trials_of.items():
-        trials = ", ".join(names)
-        sentences.append(f"{trials}: {text}")
-    return sentences
-
-
 def current_text(row: Mapping[str, Any]) -> str:
-    """One current in words: set and drift, interval, and whether there is one."""
-    sources = {
-        "all trials": "one for all",
-        "trial": "its own",
-        "given": "as given",
-        "columns": "from columns",
-    }
-    found = set_and_drift(row["north"], row["east"])
-    source = row["source"]
-    parts = [f"current of {found}", sources[source]]
+    """One current in words, its source and errors, and whether it was removed."""
+    text = f"current of {set_and_drift(row['north'], row['east'])} ({row['source']}"
     if "standard_errors" in row:
-        parts += _current_interval(row)
-    elif source in ("trial", "all trials"):
-        parts.append("a guess without an interval, as the trials keep to one heading")
-
-    text = ", ".join(parts)
-    end = "removed" if row["taken_out"] else "left in"
-    return f"{text}; {end}"
-
-
-def _current_interval(row: Mapping[str, Any]) -> list[str]:
-    """95 % interval of a current, and whether it differs from zero."""
-    north, east = row["north"], row["east"]
-    north_error, east_error = row["standard_errors"]
-    north_margin = NORMAL_95 * north_error
-    east_margin = NORMAL_95 * east_error
-    differs = row["probability"] < SIGNIFICANT
-    verb = "differs" if differs else "does not differ"
-    return [
-        f"north {north:.3f} ± {north_margin:.3f}",
-        f"east {east:.3f} ± {east_margin:.3f} m/s (95 %)",
-        f"which {verb} from zero",
-    ]
+        north, east = row["standard_errors"]
+        text += f"; standard errors {north:.3f} north, {east:.3f} m/s east"
+    return f"{text}); {'removed' if row['taken_out'] else 'left in'}"

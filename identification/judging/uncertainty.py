@@ -20,21 +20,17 @@ class Uncertainty:
         within it; a posterior always is.
     steps : int, from 20
         Steps of the walkers that sample a posterior, after half as many to warm up.
-    seed : int, at least 0
-        Of the walkers.
     """
 
     covariance: str = "analytic"
     model_error: bool = True
     steps: int = 800
-    seed: int = 0
 
     def __post_init__(self) -> None:
         kinds = ("analytic", "posterior")
         check_choice(self.covariance, kinds, "uncertainty")
         check_flag(self.model_error, "model_error")
         check_whole(self.steps, "uncertainty.steps", at_least=20)
-        check_whole(self.seed, "uncertainty.seed", at_least=0)
 
     @property
     def by_sampling(self) -> bool:

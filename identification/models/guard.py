@@ -7,7 +7,7 @@ data take over.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,14 +25,9 @@ STEP = 0.02  # of the time to sail one ship length
 
 #: The ridge regression that takes the place of a method whose model runs away.
 HELD = "hard-turn-ridge"
-
-
-class Simulation(NamedTuple):
-    """A simulation that a model has to survive."""
-
-    name: str
-    sail: Callable[[], Trial]
-    least_surge: float = 0.0  # ships go astern only where they were seen to, m/s
+#: A simulation that a model has to survive: its name, how it is sailed, and the least
+#: surge speed, m/s.
+Simulation = tuple[str, Callable[[], Trial], float]
 
 
 def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
@@ -42,15 +37,16 @@ def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
     and rudder reversed at intervals, from short to long, which excites what a zigzag of
     any other angle would. Stops after the first kind in which it does.
     """
-    recorded = _recorded(model, trials)
-    turns = _turns(model)
-    reversals = _reversals(model)
-    for simulations in (recorded, turns, reversals):
+    for kind in (_recorded(model, trials), _turns(model), _reversals(model)):
         reasons = []
-        for simulation in simulations:
-            cause = why_unphysical(model, simulation)
+        for name, sail, least_surge in kind:
+            cause = why_unphysical(
+                model,
+                sail,
+                least_surge,
+            )
             if cause is not None:
-                reasons.append(f"{simulation.name}: {cause}")
+                reasons.append(f"{name}: {cause}")
         if reasons:
             return reasons
     return []
@@ -58,89 +54,83 @@ def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
 
 def _recorded(model: ShipModel, trials: Sequence[Trial]) -> Iterator[Simulation]:
     for trial in trials:
-        yield Simulation(
-            name=f"trial {trial.name!r}, open loop",
-            sail=partial(open_loop, model, trial),
-            least_surge=float(trial["u"].min()),
-        )
+        name = f"trial {trial.name!r}, open loop"
+        yield name, partial(open_loop, model, trial), min(float(trial["u"].min()), 0.0)
 
 
 def _turns(model: ShipModel) -> Iterator[Simulation]:
     duration = DURATION_LENGTHS * model.travel_time
     dt = STEP * model.travel_time
     for angle in _angles_deg(model):
-        yield Simulation(
-            name=f"turning circle, {angle:+.0f} deg",
-            sail=partial(turning_circle, model, angle, duration, dt),
+        sail = partial(
+            turning_circle,
+            model,
+            angle,
+            duration,
+            dt,
         )
+        yield f"turning circle, {angle:+.0f} deg", sail, 0.0
 
 
 def _reversals(model: ShipModel) -> Iterator[Simulation]:
-    intervals = (2.5, 5.0, 10.0, 20.0)  # ship lengths
     for angle in _angles_deg(model):
-        for lengths in intervals:
-            yield Simulation(
-                name=f"rudder {angle:+.0f} deg reversed every {lengths:g} L/U",
-                sail=partial(
+        for lengths in (2.5, 5.0, 10.0, 20.0):
+            name = f"rudder {angle:+.0f} deg reversed every {lengths:g} L/U"
+            yield (
+                name,
+                partial(
                     reversed_rudder,
                     model,
-                    rudder_deg=angle,
-                    lengths=lengths,
+                    angle,
+                    lengths,
                 ),
+                0.0,
             )
 
 
 def _angles_deg(model: ShipModel) -> list[float]:
     """Rudder angles of the manoeuvres, to both sides and within the rudder's limit."""
     limit = model.steering.rudder_limit_deg
-    hard = min(RUDDER_DEG, limit)
-    small = min(10.0, limit)
-    angles = [hard, -hard]
-    if small < hard:
-        angles += [small, -small]
-    return angles
+    angles = dict.fromkeys([min(RUDDER_DEG, limit), min(10.0, limit)])
+    return [side * angle for angle in angles for side in (1.0, -1.0)]
 
 
 def reversed_rudder(model: ShipModel, rudder_deg: float, lengths: float) -> Trial:
     """Simulate a rudder put over from side to side, at intervals in ship lengths."""
-    n_steps = round(DURATION_LENGTHS / STEP)
-    interval = round(lengths / STEP)
-    n_reversals = np.arange(n_steps) // interval
-    to_port = n_reversals % 2 == 1
-    rudder = np.full(n_steps, np.radians(rudder_deg))
-    rudder[to_port] *= -1.0
+    steps = np.arange(round(DURATION_LENGTHS / STEP))
+    to_port = steps // round(lengths / STEP) % 2 == 1
+    commands = np.tile(model.service_command, (len(steps), 1))
+    commands[:, 0] = np.radians(
+        np.where(
+            to_port,
+            -rudder_deg,
+            rudder_deg,
+        )
+    )
+    return model.simulate(commands, STEP * model.travel_time)
 
-    ordered = 0
-    commands = np.tile(model.service_command, (n_steps, 1))
-    commands[:, ordered] = rudder
-    dt = STEP * model.travel_time
-    return model.simulate(commands, dt)
 
+def why_unphysical(
+    model: ShipModel, sail: Callable[[], Trial], least_surge: float
+) -> str | None:
+    """Why a simulation is that of no ship; None where it may be.
 
-def why_unphysical(model: ShipModel, simulation: Simulation) -> str | None:
-    """Why a simulation is that of no ship; None where it may be."""
+    Ships go astern only where they were seen to, `least_surge`, m/s.
+    """
     try:
-        trial = simulation.sail()
+        trial = sail()
     except UnstableModelError as error:
         return f"ran away after {error.time_s:.0f} s"
 
-    length = model.particulars["length"]
-    speed = model.particulars["speed"]
-    surge = trial["u"]
-    slowest = surge.min()
-    fastest = surge.max()
-    least_surge = min(simulation.least_surge, 0.0)
+    length, speed = model.particulars["length"], model.particulars["speed"]
+    slowest, fastest = trial["u"].min(), trial["u"].max()
     if slowest < least_surge or fastest > FASTEST * speed:
         return f"surge speed from {slowest:.3g} to {fastest:.3g} m/s"
-
-    sway = np.abs(trial["v"]).max()
+    sway, yaw = (np.abs(trial[name]).max() for name in "vr")
     if sway > speed:
         return f"sway speed of {sway:.3g} m/s"
-
-    yaw = np.abs(trial["r"]).max()
     if yaw * length > QUICKEST_TURN * speed:
-        yaw_deg = np.degrees(yaw)
-        return f"yaw rate of {yaw_deg:.3g} deg/s"
+        return f"yaw rate of {np.degrees(yaw):.3g} deg/s"
     return None
 
 

@@ -18,7 +18,12 @@ def hard_turn_features(
     channels = {name: np.array([turn[name]]) for name in structure.required_channels}
     sizes = {}
     for q in structure.equations:
-        features = structure.features(q, channels, particulars, shaft_speed)
+        features = structure.features(
+            q,
+            channels,
+            particulars,
+            shaft_speed,
+        )
         sizes[q] = np.abs(features[0])
 
     if "q" in sizes:  # a memory of yaw is regressed with yaw, over the time of a length

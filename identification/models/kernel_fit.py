@@ -7,14 +7,13 @@ principal components of the data in feature space.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh
 from sklearn.cluster import KMeans
-from sklearn.linear_model import Ridge
 
 from identification.arrays import column_rms
 from identification.estimators.estimator import Estimators
@@ -26,68 +25,49 @@ from identification.samples.samples import Samples
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats, finite
 from shipgym.ships import GreyBox, Structure
-from shipgym.ships.kernel_boxes import (
-    Kernel,
-    gaussians,
-    kernel_box,
-    kernel_inputs,
-)
+from shipgym.ships.kernel_boxes import Kernel, gaussians, kernel_box, kernel_inputs
 
 MIRROR = np.array([-1.0, -1.0, -1.0, 1.0])  # of the inputs, port to starboard
 INPUT_CHANNELS = ("u", "v", "r", "delta")
+MOST_SAMPLES = 4000  # of those that choose the centres and the components
 
 
-@dataclass(frozen=True, eq=False)
-class KernelFit:
-    """A kernel on what a reference ship leaves; before its fit without estimators."""
+class KernelFit(NamedTuple):
+    """A kernel on what a reference ship leaves."""
 
     model: ShipModel
     samples: Samples
-    estimators: Estimators = field(default_factory=dict)
-    report: dict[str, Any] = field(default_factory=dict)  # for the provenance
+    estimators: Estimators
+    report: dict[str, Any]  # for the provenance
 
 
-def stabilised(model: ShipModel) -> ShipModel:
-    """The linear model beneath a black box, damped so that a hard turn is bounded.
+class _Stage(NamedTuple):
+    """A kernel of one length, and the regression of its coefficients."""
 
-    Where the kernel fades the ship is linear: she must be stable, and neither drift nor
-    turn beyond any ship.
-    """
-    c = dict(model.coefficients)
-    shift = _least_damping(c, model.steering.limit)
-    c["b_v"] -= shift
-    c["c_r"] -= shift
-    # surge must be damped too, in the prime system
-    largest = -0.05 - 2.0 * c["a_0"]
-    c["a_du"] = min(c["a_du"], largest)
-    return replace(model, coefficients=c)
+    kernel: Kernel
+    blank: ShipModel
+    samples: Samples
 
+    def fitted(self, weight: float, rows: Any = slice(None)) -> Estimators:
+        """The fit to some rows, by the weight of the errors over a ship length."""
+        ship = self.blank.particulars
+        window = np.mean(self.samples.duration)
+        C = float(weight / (ship["length"] * window * ship["speed"] ** 3))
+        return {
+            q: LSSVM(C=C, scale=False, fit_intercept=False).fit(X, y)
+            for q, X, y in self.samples.select(rows).by_equation()
+        }
 
-def _least_damping(c: dict[str, float], rudder_limit: float) -> float:
-    """Least damping of sway and yaw, prime system, that keeps a linear ship bounded.
+    def model(self, estimators: Estimators) -> ShipModel:
+        """The ship with what was fitted."""
+        return self.blank.with_accelerations(
+            {q: estimator.coef_ for q, estimator in estimators.items()}
+        )
 
-    The eigenvalues of steering are, and drift and turn with the rudder hard over.
-    """
-    A = np.array(
-        [
-            [c["b_v"], c["b_r"]],
-            [c["c_v"], c["c_r"]],
-        ]
-    )
-    by_rudder = np.array([c["b_d"], c["c_d"]])
-    hard_over = rudder_limit * by_rudder
-    for step in range(2000):
-        shift = 0.05 * step
-        damped = A - shift * np.eye(2)
-        steady = np.linalg.solve(damped, hard_over)
-        drift, turn = np.abs(steady)
-        slowest = np.linalg.eigvals(damped).real.max()
-        if slowest < -0.2 and drift < 0.5 and turn < 1.2:
-            return float(shift)
-    raise InputError(
-        "kernel: expected a linear ship beneath it that some damping stabilises, got"
-        " none; check rudder and yaw rate, or name a reference_model"
-    )
+    def fit(self, weight: float, report: dict[str, Any]) -> KernelFit:
+        """The fit to all rows."""
+        estimators = self.fitted(weight)
+        return KernelFit(self.model(estimators), self.samples, estimators, report)
 
 
 def fit_kernel(
@@ -102,7 +82,7 @@ def fit_kernel(
 
     Length and weight of the errors, where not given, are the smoothest whose simulated
     headings of the trials held out are within a tenth of the best; a fitted reference
-    ship knows these trials.
+    ship knows these trials. Raises InputError for too few samples.
 
     Parameters
     ----------
@@ -118,79 +98,52 @@ def fit_kernel(
         `INPUT_CHANNELS` of each trial, smoothed.
     build_rows : callable
         The regression of the trials with a structure.
-
-    Raises
-    ------
-    InputError
-        For too few samples.
     """
     inputs = np.concatenate([kernel_inputs(one, blank.particulars) for one in channels])
     # lengths in root mean squares of the inputs, the smoothest first
-    lengths: Sequence[float] = (2.8, 2.0, 1.4, 1.0, 0.7)
-    if asked.length is not None:
-        lengths = (float(asked.length),)
-    # weights of squared errors over a ship length
-    weights: Sequence[float] = np.geomspace(0.1, 1e4, 6).tolist()
-    if asked.C is not None:
-        weights = (float(asked.C),)
-
-    kernels = _kernels(inputs, asked.centres, lengths)
-    stages = {}
-    for length, kernel in kernels.items():
-        model = _without_coefficients(blank, kernel_box(box, kernel))
-        stages[length] = KernelFit(model, build_rows(model.table))
+    lengths = (2.8, 2.0, 1.4, 1.0, 0.7) if asked.length is None else (asked.length,)
+    weights = np.geomspace(0.1, 1e4, 6) if asked.C is None else (asked.C,)
+    stages = {
+        length: _stage(
+            blank,
+            box,
+            _kernel(inputs, asked.centres, length),
+            build_rows,
+        )
+        for length in lengths
+    }
 
     def error(weight: float, length: float) -> float:
-        return _error_held_out(stages[length], trials, weight, asked.folds)
+        """Mean error of the simulated headings of trials held out."""
+        stage, errors = stages[length], []
+        for rows, held in held_out_rows(trials, stage.samples):
+            model = stage.model(stage.fitted(weight, rows)) if weight else stage.blank
+            errors.append(heading_error(model, held))
+        return float(np.mean(errors))
 
-    pairs = list(product(weights, lengths))  # the smoothest first
-    best = pairs[0]
+    pairs = list(product(map(float, weights), lengths))  # the smoothest first
     errors = {}
+    weight, length = pairs[0]
     if len(pairs) > 1:
         tried = [error(*pair) for pair in pairs]
-        best = most_regularised(pairs, tried)
-        errors["kernel"] = tried[pairs.index(best)]
-    weight, length = best
+        weight, length = most_regularised(pairs, tried)
+        errors["kernel"] = tried[pairs.index((weight, length))]
     errors["reference"] = error(0.0, length)
 
-    kernel = kernels[length]
-    report = {
-        "kind": asked.kernel,
-        "centres": len(kernel.centres),
-        "features": kernel.basis.shape[1],
-        "length": length,
-        "C": weight,
-        "remarks": _remarks(errors),
-        "heading_errors_held_out": {
-            name: finite(error) for name, error in errors.items()
-        },
-    }
-    return replace(_fitted(stages[length], weight), report=report)
+    chosen = stages[length]
+    report = {"kind": asked.kernel, "length": length, "C": weight}
+    return chosen.fit(weight, report | _told(chosen.kernel, errors))
 
 
-def _kernels(
-    inputs: Floats,
-    number: int,
-    lengths: Sequence[float],
-) -> dict[float, Kernel]:
-    """Kernels by their length, on centres among the samples."""
-    offset, scale, centres = chosen_centres(inputs, number)
-    basis = np.eye(len(centres))
-    kernels = {}
-    for length in lengths:
-        kernel = Kernel(
-            offset=offset,
-            scale=scale * length,
-            centres=centres / length,
-            basis=basis,
-        )
-        kernels[length] = principal(kernel, inputs)
-    return kernels
-
-
-def _without_coefficients(blank: ShipModel, table: Structure) -> ShipModel:
-    """The ship with a table, all coefficients 0."""
-    return replace(
+def _stage(
+    blank: ShipModel,
+    box: GreyBox,
+    kernel: Kernel,
+    build_rows: Callable[[Structure], Samples],
+) -> _Stage:
+    """A kernel on a reference ship, with the regression of its coefficients."""
+    table = kernel_box(box, kernel)
+    ship = replace(
         blank,
         structure=table.name,
         dynamics=table,
@@ -199,122 +152,65 @@ def _without_coefficients(blank: ShipModel, table: Structure) -> ShipModel:
         provenance=None,
         coefficients=dict.fromkeys(table.coefficient_names, 0.0),
     )
+    return _Stage(kernel, ship, build_rows(table))
 
 
-def _error_weight(stage: KernelFit, weight: float) -> float:
-    """Weight of the errors of the rows, from that by ship length, prime system."""
-    ship = stage.model.particulars
-    window = np.mean(stage.samples.duration)
-    return float(weight / (ship["length"] * window * ship["speed"] ** 3))
-
-
-def _error_held_out(
-    stage: KernelFit, trials: Sequence[Trial], weight: float, folds: str
-) -> float:
-    """Mean error of the simulated headings of what is held out.
-
-    Weight 0 gives that of the reference ship.
-    """
-    C = _error_weight(stage, weight)
-    errors = []
-    for rows, held in held_out_rows(trials, stage.samples, folds):
-        model = stage.model
-        if weight:
-            ridge = Ridge(1.0 / C, fit_intercept=False)
-            by_equation = stage.samples.select(rows).by_equation()
-            found = {q: ridge.fit(X, y).coef_ for q, X, y in by_equation}
-            model = model.with_accelerations(found)
-        errors.append(heading_error(model, held))
-    return float(np.mean(errors))
-
-
-def _fitted(stage: KernelFit, weight: float) -> KernelFit:
-    """The fit to all rows."""
-    C = _error_weight(stage, weight)
-    estimators: Estimators = {}
-    for q, X, y in stage.samples.by_equation():
-        estimator = LSSVM(C=C, scale=False, fit_intercept=False)
-        estimators[q] = estimator.fit(X, y)
-    coefficients = {q: estimator.coef_ for q, estimator in estimators.items()}
-    model = stage.model.with_accelerations(coefficients)
-    return replace(stage, model=model, estimators=estimators)
+def _told(kernel: Kernel, errors: dict[str, float]) -> dict[str, Any]:
+    """What the provenance says of a kernel and of errors on held-out trials."""
+    return {
+        "centres": len(kernel.centres),
+        "features": kernel.basis.shape[1],
+        "remarks": _remarks(errors),
+        "heading_errors_held_out": {name: finite(one) for name, one in errors.items()},
+    }
 
 
 def _remarks(errors: dict[str, float]) -> list[str]:
     """Remarks for the user on the errors on held-out trials."""
-    if "kernel" not in errors or errors["kernel"] < errors["reference"]:
+    if errors.get("kernel", 0.0) < errors["reference"]:
         return []
-    kernel = np.degrees(errors["kernel"])
-    reference = np.degrees(errors["reference"])
+    kernel, reference = np.degrees([errors["kernel"], errors["reference"]])
     return [
         "on held-out trials the kernel predicts the heading no better than its"
         f" reference ship alone ({kernel:.2g} and {reference:.2g} deg rms)"
     ]
 
 
-def chosen_centres(
-    x: Floats,
-    number: int,
-    most_samples: int = 4000,
-) -> tuple[Floats, Floats, Floats]:
-    """Offset and scale of inputs x, shape (n_samples, 4), and centres in these.
+def _kernel(x: Floats, number: int, length: float) -> Kernel:
+    """A kernel of a length for inputs x, shape (n_samples, 4).
 
     Centres are those of k-means of all samples brought to one side, and their mirror
-    images. Raises InputError for too few samples.
+    images. Features are the leading principal components in feature space, so that the
+    covariance of their coefficients stays small. Raises InputError for too few samples.
     """
-    speed = x[:, 3]
-    offset = np.array([0.0, 0.0, 0.0, speed.mean()])
-    deviations = x - offset
-    scale = np.maximum(column_rms(deviations), 0.02)  # an input may hardly change
-    folded = _folded(deviations / scale)
-
-    needed = 3 * number
-    different = np.unique(folded, axis=0)
-    if len(different) < needed:
+    offset = np.array([0.0, 0.0, 0.0, x[:, 3].mean()])
+    scale = np.maximum(column_rms(x - offset), 0.02)  # an input may hardly change
+    scaled = (x - offset) / scale
+    drifts_to_port = scaled[:, 1:2] < 0.0
+    folded = np.where(drifts_to_port, scaled * MIRROR, scaled)
+    if len(np.unique(folded, axis=0)) < 3 * number:
         raise InputError(
-            f"trials: expected at least {needed} different samples for {number} centres"
-            f" of the kernel, got {len(x)} samples; add trials, or give fewer centres"
+            f"trials: expected at least {3 * number} different samples for {number}"
+            f" centres of the kernel, got {len(x)} samples; add trials, or give fewer"
+            " centres"
         )
-    clusters = KMeans(number // 2, n_init=1, random_state=0)
-    clusters.fit(_thinned(folded, most_samples))
+    every = -(-len(x) // MOST_SAMPLES)
+    clusters = KMeans(
+        number // 2,
+        n_init=1,
+        random_state=0,
+    ).fit(folded[::every])
     means = clusters.cluster_centers_
-    centres = np.concatenate([means, means * MIRROR])
-    return offset, scale, centres
+    centres = np.concatenate([means, means * MIRROR]) / length
 
-
-def _folded(z: Floats) -> Floats:
-    """Inputs with those of a drift to port mirrored."""
-    drifts_to_port = z[:, 1:2] < 0.0
-    sides = np.where(drifts_to_port, MIRROR, 1.0)
-    return np.asarray(z * sides)
-
-
-def principal(
-    kernel: Kernel,
-    x: Floats,
-    most_features: int = 40,
-    most_samples: int = 4000,
-) -> Kernel:
-    """The kernel with principal components in feature space as features.
-
-    The leading ones of the samples x are few, so that the covariance of their
-    coefficients stays small.
-    """
-    scaled = (x - kernel.offset) / kernel.scale
-    z = _thinned(scaled, most_samples)
-    mirrored = z * MIRROR
-    both_sides = np.concatenate([z, mirrored])
-    centres = kernel.centres
-    values = gaussians(both_sides, centres)
-    moment = values.T @ values / len(values)
-
-    among_centres = gaussians(centres, centres)
-    jitter = 1e-9 * np.eye(len(centres))
-    _, vectors = eigh(moment, among_centres + jitter)
-    leading_first = vectors[:, ::-1]
-    return replace(kernel, basis=np.ascontiguousarray(leading_first[:, :most_features]))
-
-
-def _thinned(x: Floats, most: int) -> Floats:
-    every = max(1, -(-len(x) // most))
-    return x[::every]
+    samples = scaled[::every] / length
+    values = gaussians(np.concatenate([samples, samples * MIRROR]), centres)
+    among_centres = gaussians(centres, centres) + 1e-9 * np.eye(len(centres))
+    _, vectors = eigh(values.T @ values / len(values), among_centres)
+    basis = np.ascontiguousarray(vectors[:, ::-1][:, :40])
+    return Kernel(
+        offset=offset,
+        scale=scale * length,
+        centres=centres,
+        basis=basis,
+    )

@@ -11,6 +11,7 @@ from sklearn.base import clone
 
 from identification.arrays import column_rms
 from identification.estimators.adapted import Adapted
+from identification.estimators.decomposition import scales_of
 from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.linear import LinearRegressor
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
@@ -105,15 +106,8 @@ def get_method(method: str | Any) -> Method:
         )
     make = partial(without_constant, method)
     if isinstance(method, LinearRegressor):
-        return Method(
-            name=method.method_name,
-            make=make,
-            regularised=method.regularised,
-        )
-    return Method(
-        name=type(method).__name__,
-        make=make,
-    )
+        return Method(method.method_name, make, method.regularised)
+    return Method(type(method).__name__, make)
 
 
 def fit_held(
@@ -127,57 +121,45 @@ def fit_held(
     contribution there. To it comes the penalty of the estimators that were `fitted`
     without it, which is the least.
     """
-    mean_duration = np.mean(samples.duration)
-    window = float(mean_duration)
+    window = float(np.mean(samples.duration))
     penalty = len(samples) * strength**2
     estimators: Estimators = {}
     for q, X, y in samples.by_equation():
         by_turn = penalty * (sizes[q] * window) ** 2
-        ridge = LSSVM(
+        scale = np.sqrt(by_turn + own_penalty(fitted[q], X))
+        estimators[q] = LSSVM(
             C=1.0,
-            scale=np.sqrt(by_turn + own_penalty(fitted[q], X)),
+            scale=scale,
             fit_intercept=False,
-        )
-        estimators[q] = ridge.fit(X, y)
+        ).fit(X, y)
     return estimators
 
 
 def own_penalty(estimator: Any, X: Floats) -> Floats | float:
     """Penalty of each squared coefficient that a fitted LS-SVM has; 0 for others."""
-    if not isinstance(estimator, LSSVM | TruncatedLSSVM | TunedLSSVM):
+    if not isinstance(estimator, LSSVM | TunedLSSVM):
         return 0.0
-    scale = np.asarray(estimator.scale, dtype=float)
-    if estimator.scale is True:
-        scale = column_rms(X)
-    elif estimator.scale is False:
-        scale = np.ones(X.shape[1])
+    scale = scales_of(column_rms(X), estimator.scale)
     return np.asarray(scale**2 / estimator.error_weight())
 
 
 def without_constant(estimator: Any) -> Estimator:
     """An unfitted copy of an estimator object, without intercept if it can."""
     copied = clone(estimator, safe=False)
-    settings = {}
-    if hasattr(copied, "get_params"):
-        settings = copied.get_params(deep=False)
-    if "fit_intercept" in settings:
+    if "fit_intercept" in getattr(copied, "get_params", dict)():
         copied.set_params(fit_intercept=False)
-
     if not isinstance(copied, LinearRegressor):
         # others than our own do not know their moment
         copied = Adapted(copied)
-    estimator_copy: Estimator = copied
-    return estimator_copy
+    found: Estimator = copied
+    return found
 
 
 def method_options(name: str) -> tuple[str, ...]:
     """Names of the settings that a method of `METHODS` has."""
     kind = _kind(name)
     own: tuple[str, ...] = kind.options
-    if kind is Refinement:
-        of_start = TruncatedLSSVM.options
-        return (*own, *of_start)
-    return own
+    return (*own, *TruncatedLSSVM.options) if kind is Refinement else own
 
 
 def make_method(name: str, settings: Mapping[str, Any] | None = None) -> Any:
@@ -199,11 +181,6 @@ def make_method(name: str, settings: Mapping[str, Any] | None = None) -> Any:
     if kind is not Refinement:
         return kind(**{**METHODS[name][1], **settings})
 
-    own = {}
-    of_start = {}
-    for setting, value in settings.items():
-        if setting in Refinement.options:
-            own[setting] = value
-        else:
-            of_start[setting] = value
+    own = {name: settings[name] for name in settings if name in Refinement.options}
+    of_start = {name: settings[name] for name in settings if name not in own}
     return Refinement(**own, start=TruncatedLSSVM(**of_start))

@@ -5,6 +5,7 @@ Those of a reference ship, or from main dimensions.
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -124,49 +125,42 @@ def _formula_prior(ship: Particulars) -> MMGPrior:
 
 
 def _reference_prior(source: str | ShipModel, ship: Particulars) -> MMGPrior:
-    model, similarity = _reference(source, ship)
-    remarks: tuple[str, ...] = ()
+    """The prior of a reference ship.
+
+    Refused where she has other equations, and the best of the candidates where none is
+    like the ship.
+    """
+    model = _in_mmg_form(source, ship)
+    similarity = _similarity(model, ship)
     like = similarity.get(model.name, 1.0)
+    if source == AUTO:
+        otherwise = "give prior = 'yoshimura' for formulas of the main dimensions"
+        check_alike(model.name, like, otherwise)
+    remarks: tuple[str, ...] = ()
     if like < LEAST_SIMILARITY:
         remarks = (
             f"reference ship {model.name!r} is not like this one: similarity"
             f" {like:.2f}; compare with prior = 'yoshimura'",
         )
-    deviations = [DEVIATIONS[name][0] for name in IDENTIFIED]
     return MMGPrior(
         source=model.name,
         ship=ship,
         mean=reference_coefficients(model),
-        deviation=np.array(deviations),
+        deviation=np.array([DEVIATIONS[name][0] for name in IDENTIFIED]),
         remarks=remarks,
         similarity=similarity,
     )
 
 
-def _reference(
-    source: str | ShipModel, ship: Particulars
-) -> tuple[ShipModel, dict[str, float]]:
-    """The reference ship and the similarity of the candidates.
-
-    Refused where it has other equations, and the best of the candidates where none is
-    like the ship.
-    """
-    model = _in_mmg_form(source, ship)
+def _similarity(model: ShipModel, ship: Particulars) -> dict[str, float]:
+    """Similarity of a reference ship, and of the others; empty if unknown."""
     vectors = {model.name: similarity_vector(model.particulars)}
     for name, make in REFERENCE_SHIPS.items():
         if name != "mariner":
-            candidate = make()
-            particulars = candidate.particulars.completed()
-            vectors[name] = similarity_vector(particulars)
-    own = similarity_vector(ship)
-    try:
-        similarity = correlations(own, vectors)
-    except InputError:  # too little is known to compare
-        return model, {}
-    if source == AUTO:
-        otherwise = "give prior = 'yoshimura' for formulas of the main dimensions"
-        check_alike(model.name, similarity[model.name], otherwise)
-    return model, similarity
+            vectors[name] = similarity_vector(make().particulars.completed())
+    with suppress(InputError):  # too little may be known to compare
+        return correlations(similarity_vector(ship), vectors)
+    return {}
 
 
 def _in_mmg_form(source: str | ShipModel, ship: Particulars) -> ShipModel:
@@ -224,12 +218,10 @@ def _out_of_range(ship: Particulars) -> tuple[str, ...]:
         ("L/B", L / B, 3.5, 7.5),
         ("B/T", B / T, 2.0, 4.5),
     ]
-    remarks = []
-    for name, value, low, high in ratios:
-        if not low <= value <= high:
-            remarks.append(
-                f"{name} {value:.3g} is outside the range of the regression formulas,"
-                f" {low:g} to {high:g}: their coefficients are doubtful; name a"
-                " reference_model like this ship"
-            )
-    return tuple(remarks)
+    return tuple(
+        f"{name} {value:.3g} is outside the range of the regression formulas, {low:g}"
+        f" to {high:g}: their coefficients are doubtful; name a reference_model like"
+        " this ship"
+        for name, value, low, high in ratios
+        if not low <= value <= high
+    )

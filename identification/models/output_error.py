@@ -9,7 +9,6 @@ Bock 1983): whole trials would let a drift of heading leak into the coefficients
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from identification.models.least_squares import (
     Linearised,
     fit_least_squares,
 )
+from identification.models.sailed import with_prior
 from identification.models.segments import BLOCK, Segment, velocities
 from identification.models.shooting import channel_units, in_all_lanes, sail_lanes
 from shipgym import ShipModel
@@ -46,9 +46,6 @@ class Solution:
     scales: Floats  # of the residuals by channel, shape (n_channels,)
     pull: float  # to the start, as `OutputError.solve` takes it
     shooting: Shooting
-    cost_before: float  # mean squared residual at the start, in these scales
-    cost_after: float
-    evaluations: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,20 +82,10 @@ class OutputError:
         return channel_units(self.model, self.channels)
 
     @property
-    def n_samples(self) -> int:
-        """Samples of all segments."""
-        return sum(len(segment.measured) for segment in self.segments)
-
-    @property
     def bin_width(self) -> float:
         """Bins of time in which residuals are added up, s: blocks or sampling steps."""
-        travel_time = self.model.travel_time
-        width = float(BLOCK * travel_time)
-        for segment in self.segments:
-            if len(segment.times) > 1:
-                step = usual_step(segment.times)
-                width = max(width, step)
-        return width
+        steps = [usual_step(one.times) for one in self.segments if len(one.times) > 1]
+        return max([BLOCK * self.model.travel_time, *steps])
 
     def shoot(
         self, parameters: Floats, segments: Sequence[Segment], scales: Floats
@@ -112,17 +99,15 @@ class OutputError:
         finite where a ship ran away.
         """
         coefficients = parameters * self.term_sizes
-        residuals, jacobians, moves = [], [], []
+        found = []
         for segment in segments:
             errors, slopes = self._block_errors(coefficients, segment, scales)
-            residual, slopes, move = without_start(errors, slopes, len(self.free))
-            residuals.append(residual)
-            jacobians.append(slopes)
-            moves.append(move)
+            found.append(without_start(errors, slopes, len(self.free)))
+        residuals, jacobians, moves = zip(*found, strict=True)
         return Shooting(
             residuals=np.concatenate(residuals),
             jacobian=np.concatenate(jacobians),
-            moves=moves,
+            moves=list(moves),
         )
 
     def _moved_if_sailed(
@@ -186,7 +171,12 @@ class OutputError:
             lanes[rows, lane] += step * units[begin : begin + LANES - 1]
 
             ships, begun = lanes[:n_numbers], lanes[n_numbers:]
-            sailed = sail_lanes(self.model, segment, ships, begun)[:, self.columns]
+            sailed = sail_lanes(
+                self.model,
+                segment,
+                ships,
+                begun,
+            )[:, self.columns]
             channels = sailed[:, :, 0]
             with np.errstate(invalid="ignore", over="ignore"):  # of ships that ran away
                 changes = sailed[:, :, lane] - channels[:, :, None]
@@ -203,13 +193,17 @@ class OutputError:
 
         `scales`: those in which the residuals are given.
         """
-        by_channel = shooting.residuals.reshape(-1, len(scales))
-        errors = by_channel * scales
-        squares = np.sum(errors**2, axis=0)
+        errors = shooting.residuals.reshape(-1, len(scales)) * scales
+        n_samples = sum(len(segment.measured) for segment in self.segments)
         # a residual is a mean over a block, times the root of its samples
-        rms = np.sqrt(squares / self.n_samples)
-        smallest = 1e-9 * self.units
-        return np.asarray(np.maximum(rms, smallest))
+        rms = np.sqrt(
+            np.sum(
+                errors**2,
+                axis=0,
+            )
+            / n_samples
+        )
+        return np.asarray(np.maximum(rms, 1e-9 * self.units))
 
     def pull_weight(self, pull: float) -> float:
         """Weight of each parameter's distance from the start.
@@ -228,26 +222,14 @@ class OutputError:
         weight = self.pull_weight(pull)
         parameters = self.start
         segments = self.segments
-        evaluations = 0
         for _ in range(rounds):
-            last_scales, last_segments = scales, segments
-            fit = self._fit(parameters, segments, scales, weight)
-            parameters = fit.x
-            evaluations += fit.nfev
+            last_scales = scales
+            parameters = self._fit(parameters, segments, scales, weight)
             shooting = self.shoot(parameters, segments, scales)
             segments = self._moved_if_sailed(parameters, segments, shooting, scales)
             scales = self.scales(shooting, scales)
 
-        before = self.shoot(self.start, last_segments, last_scales)
-        return Solution(
-            parameters=parameters,
-            scales=last_scales,
-            pull=pull,
-            shooting=shooting,
-            cost_before=self._mean_square(before),
-            cost_after=self._mean_square(shooting),
-            evaluations=evaluations,
-        )
+        return Solution(parameters, last_scales, pull, shooting)
 
     def _fit(
         self,
@@ -255,28 +237,18 @@ class OutputError:
         segments: Sequence[Segment],
         scales: Floats,
         weight: float,
-    ) -> Any:
+    ) -> Floats:
         """Parameters of least cost between two renewals of scales and starts."""
 
         def linearised(parameters: Floats) -> Linearised:
             shooting = self.shoot(parameters, segments, scales)
-            pulled = weight * (parameters - self.start)
-            return Linearised(
-                residuals=np.concatenate([shooting.residuals, pulled]),
-                jacobian=np.vstack([shooting.jacobian, weight * np.eye(len(pulled))]),
-            )
+            data = Linearised(shooting.residuals, shooting.jacobian)
+            return with_prior(data, parameters - self.start, weight)
 
-        return fit_least_squares(
-            linearised,
-            start,
-            x_scale="jac",
-            ftol=1e-6,
-            xtol=1e-6,
-            max_nfev=30,
+        found = fit_least_squares(
+            linearised, start, x_scale="jac", ftol=1e-6, xtol=1e-6, max_nfev=30
         )
-
-    def _mean_square(self, shooting: Shooting) -> float:
-        return float(np.mean(shooting.residuals**2))
+        return np.asarray(found.x)
 
     def covariance(
         self, solution: Solution, memory: float
@@ -288,78 +260,68 @@ class OutputError:
         influences, by trial, are what each bin of time added to the
         coefficients, shape (n_bins, n_coefficients).
         """
-        inverse = self._inverse_information(solution)
-        scores = self._scores(solution.shooting)
-        factor = self._freedom_factor(solution.shooting, inverse)
-        sizes = self.term_sizes
-
-        influences = []
-        for trial_scores in scores:
-            moves = trial_scores @ inverse
-            influence = -np.sqrt(factor) * moves * sizes
-            influences.append(influence)
-
-        moment = self._score_moment(scores, memory)
-        of_parameters = factor * inverse @ moment @ inverse
-        units = np.outer(sizes, sizes)
-        covariance = of_parameters * units
-        return 0.5 * (covariance + covariance.T), influences
-
-    def _score_moment(self, scores: Sequence[Floats], memory: float) -> Floats:
-        """Long-run second moment of the scores, each trial by itself."""
-        lags = round(memory / self.bin_width)
-        n_parameters = len(self.start)
-        moment = np.zeros((n_parameters, n_parameters))
-        for trial_scores in scores:
-            moment += newey_west(trial_scores, lags)
-        return moment
-
-    def _inverse_information(self, solution: Solution) -> Floats:
-        """Inverse of the information of the samples and the pull."""
-        jacobian = solution.shooting.jacobian
-        of_samples = jacobian.T @ jacobian
-        of_pull = self.pull_weight(solution.pull) ** 2 * np.eye(len(self.start))
-        inverse = np.linalg.pinv(
-            of_samples + of_pull,
-            rcond=1e-14,
-            hermitian=True,
+        shooting, sizes = solution.shooting, self.term_sizes
+        information = shooting.jacobian.T @ shooting.jacobian
+        of_pull = self.pull_weight(solution.pull) ** 2 * np.eye(len(sizes))
+        inverse = np.asarray(
+            np.linalg.pinv(information + of_pull, rcond=1e-14, hermitian=True),
+            dtype=float,
         )
-        return np.asarray(inverse, dtype=float)
+        factor = self._freedom_factor(shooting, inverse)
+        scores = self._scores(shooting)
+        influences = [-np.sqrt(factor) * (own @ inverse) * sizes for own in scores]
+
+        # the long-run second moment of the scores, each trial by itself
+        lags = round(memory / self.bin_width)
+        moment = np.sum([newey_west(own, lags) for own in scores], axis=0)
+        of_parameters = factor * inverse @ moment @ inverse
+        covariance = of_parameters * np.outer(sizes, sizes)
+        return 0.5 * (covariance + covariance.T), influences
 
     def _scores(self, shooting: Shooting) -> list[Floats]:
         """Slopes times residuals, by trial in bins of time.
 
-        Shape (n_bins, n_parameters).
+        Shapes (n_bins, n_parameters).
         """
         rows = shooting.jacobian * shooting.residuals[:, None]
-
         # the channels of a block stand together
-        n_channels = len(self.channels)
-        n_parameters = rows.shape[1]
-        blocks = rows.reshape(-1, n_channels, n_parameters)
-        scores = blocks.sum(axis=1)
-        return in_bins(scores, self.segments, self.bin_width)
+        scores = rows.reshape(
+            -1,
+            len(self.channels),
+            rows.shape[1],
+        ).sum(axis=1)
+        times = np.concatenate([segment.times for segment in self.segments])
+        trial = np.repeat(
+            [segment.trial for segment in self.segments],
+            [len(segment.times) for segment in self.segments],
+        )
+        bins = np.floor(times / self.bin_width).astype(int)
+        by_trial = []
+        for index in np.unique(trial):
+            own = trial == index
+            place = bins[own] - bins[own].min()
+            sums = np.zeros((place.max() + 1, scores.shape[1]))
+            np.add.at(sums, place, scores[own])
+            by_trial.append(sums)
+        return by_trial
 
     def _freedom_factor(self, shooting: Shooting, inverse: Floats) -> float:
-        """Samples by samples less the parameters and starts fitted to them."""
+        """Samples by samples less the parameters and starts fitted to them.
+
+        Parameters count by their leverage, as the pull gives some of them.
+        """
         repeats = 2.0 if self.staggered else 1.0
         n_samples = len(shooting.residuals) / repeats
-
-        # parameters count by their leverage, as the pull gives some of them
         jacobian = shooting.jacobian
-        leverage = (jacobian @ inverse) * jacobian
-        parameters = float(leverage.sum())
-
+        parameters = float(np.sum((jacobian @ inverse) * jacobian))
         starts = sum(len(move) for move in shooting.moves) / repeats
-        left = n_samples - parameters - starts
-        return n_samples / max(left, 1.0)
+        return n_samples / max(n_samples - parameters - starts, 1.0)
 
 
 def averaged(values: Floats, blocks: Integers, counts: Integers) -> Floats:
     """Means over blocks along the first axis, from their first samples and sizes."""
-    sums = np.add.reduceat(values, blocks)
-    sizes = np.expand_dims(counts, tuple(range(1, values.ndim)))
-    return np.asarray(sums / sizes)
+    sizes = counts.reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray(np.add.reduceat(values, blocks) / sizes)
 
 
 def without_start(
@@ -378,37 +340,11 @@ def without_start(
 
     q, r = np.linalg.qr(by_start)
     explained = q.T @ residual
-    move, *_ = np.linalg.lstsq(r, -explained, rcond=1e-10)
+    move, *_ = np.linalg.lstsq(
+        r,
+        -explained,
+        rcond=1e-10,
+    )
     residual = residual - q @ explained
     others = others - q @ (q.T @ others)
     return residual, others, move
-
-
-def in_bins(scores: Floats, segments: Sequence[Segment], width: float) -> list[Floats]:
-    """Scores of blocks, shape (n_blocks, n_parameters), added up by trial and time.
-
-    Bins of time are `width` wide, s, from the first block of each trial on. Shapes
-    (n_bins, n_parameters).
-    """
-    trials = [segment.trial for segment in segments]
-    counts = [len(segment.times) for segment in segments]
-    trial = np.repeat(trials, counts)
-    times = np.concatenate([segment.times for segment in segments])
-
-    by_trial = []
-    for index in np.unique(trial):
-        rows = trial == index
-        sums = _sums_in_time(scores[rows], times[rows], width)
-        by_trial.append(sums)
-    return by_trial
-
-
-def _sums_in_time(scores: Floats, times: Floats, width: float) -> Floats:
-    """Scores of one trial, added up in bins of time."""
-    bins = np.floor(times / width).astype(int)
-    bins -= bins.min()
-    n_bins = bins.max() + 1
-    n_parameters = scores.shape[1]
-    sums = np.zeros((n_bins, n_parameters))
-    np.add.at(sums, bins, scores)
-    return sums

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import by_name, column_rms, root_mean_square
-from identification.estimators.estimator import Estimators, FitTask
+from identification.estimators.estimator import FitTask
 from identification.models.guard import GuardedFit, reasons_unstable
 from identification.models.output_error import OutputError, Solution
 from identification.models.refinement import Refinement
@@ -50,62 +50,47 @@ def refine(
     are pulled.
     """
     problem = _posed(start, task, settings)
+    report = {name: getattr(settings, name) for name in settings.options}
     scales = problem.start_scales()
-    simulated = np.isfinite(scales).all()
-    if not (start.stable and simulated):
-        report: dict[str, Any] = {"decision": "not refined: the start runs away"}
-        return _kept(start, settings, report)
+    if not (start.stable and np.isfinite(scales).all()):
+        report["decision"] = "not refined: the start runs away"
+        return Refined(
+            start,
+            None,
+            [],
+            report,
+        )
 
     rejected = list[dict[str, Any]]()
     pull = settings.pull
     for _ in range(4):
         solution = problem.solve(scales, pull, rounds)
-        model = _model(start.model, problem, solution.parameters)
+        coefficients = solution.parameters * problem.term_sizes
+        blank = start.model
+        values = np.linalg.solve(blank.acceleration_matrix, coefficients)
+        model = blank.with_coefficients(np.asarray(values, dtype=float))
         reasons = reasons_unstable(model, task.trials)
-        if not reasons:
-            report = settings.plain() | _report(problem, solution)
-            if rejected:
-                report["rejected"] = rejected
-            return _refined(
-                replace(start, model=model),
-                problem=problem,
-                solution=solution,
-                memory=memory,
-                report=report,
-            )
-        rejected.append({"pull": pull, "reasons": reasons})
-        pull = max(10.0 * pull, 1e-9)
+        if reasons:
+            rejected.append({"pull": pull, "reasons": reasons})
+            pull = max(10.0 * pull, 1e-9)
+            continue
+        report |= _report(problem, solution)
+        if rejected:
+            report["rejected"] = rejected
+        fit = _refined(start, model, coefficients)
+        return Refined(fit, *problem.covariance(solution, memory), report)
 
-    report = {"decision": "not refined: it runs away", "rejected": rejected}
-    return _kept(start, settings, report)
+    report |= {"decision": "not refined: it runs away", "rejected": rejected}
+    return Refined(start, None, [], report)
 
 
-def _refined(
-    fit: GuardedFit,
-    problem: OutputError,
-    solution: Solution,
-    memory: float,
-    report: dict[str, Any],
-) -> Refined:
-    """A fit, its model refined already, with estimators and covariance."""
-    estimators = _estimators(fit, problem, solution.parameters)
-    covariance, influences = problem.covariance(solution, memory)
-    return Refined(
-        fit=replace(fit, estimators=estimators),
-        covariance=covariance,
-        influences=influences,
-        report=report,
-    )
-
-
-def _kept(start: GuardedFit, settings: Refinement, report: dict[str, Any]) -> Refined:
-    """The start itself, with what was decided."""
-    return Refined(
-        fit=start,
-        covariance=None,
-        influences=[],
-        report=settings.plain() | report,
-    )
+def _refined(start: GuardedFit, model: ShipModel, coefficients: Floats) -> GuardedFit:
+    """The fit with a refined model, and estimators for the diagnostics."""
+    estimators = {}
+    for q, rows in model.table.regression_rows.items():
+        estimators[q] = copy.copy(start.estimators[q])
+        estimators[q].coef_ = coefficients[rows]
+    return replace(start, model=model, estimators=estimators)
 
 
 def _posed(start: GuardedFit, task: FitTask, settings: Refinement) -> OutputError:
@@ -121,19 +106,15 @@ def _posed(start: GuardedFit, task: FitTask, settings: Refinement) -> OutputErro
     equations = blank.table.equations
     sizes = np.concatenate([term_sizes(task.samples, q) for q in equations])
     values = np.concatenate([start.estimators[q].coef_ for q in equations])
+    lengths, staggered = settings.segment_lengths, settings.staggered
+    segments = cut(task.trials, blank, channels, lengths, staggered)
     return OutputError(
-        model=blank,
-        channels=channels,
-        term_sizes=sizes,
-        segments=cut(
-            task.trials,
-            blank,
-            channels,
-            settings.segment_lengths,
-            settings.staggered,
-        ),
-        start=values / sizes,
-        staggered=settings.staggered,
+        blank,
+        channels,
+        sizes,
+        segments,
+        values / sizes,
+        staggered,
     )
 
 
@@ -144,39 +125,13 @@ def term_sizes(samples: Samples, equation: str) -> Floats:
     """
     change = root_mean_square(samples.targets[equation])
     terms = column_rms(samples.features[equation])
-    unseen = terms == 0.0
-    terms[unseen] = np.inf
     # never 0: coefficients are divided by the size of a term that is not seen, too
-    smallest = np.finfo(float).tiny
-    return change / terms + smallest
-
-
-def _model(blank: ShipModel, problem: OutputError, parameters: Floats) -> ShipModel:
-    accelerations = parameters * problem.term_sizes
-    values = np.linalg.solve(blank.acceleration_matrix, accelerations)
-    return blank.with_coefficients(np.asarray(values, dtype=float))
-
-
-def _estimators(
-    start: GuardedFit, problem: OutputError, parameters: Floats
-) -> Estimators:
-    """The start's estimators with the refined coefficients, for the diagnostics."""
-    coefficients = parameters * problem.term_sizes
-    estimators = {}
-    for q, rows in start.model.table.regression_rows.items():
-        refined = copy.copy(start.estimators[q])
-        refined.coef_ = coefficients[rows]
-        estimators[q] = refined
-    return estimators
+    return change / np.where(terms > 0.0, terms, np.inf) + np.finfo(float).tiny
 
 
 def _report(problem: OutputError, solution: Solution) -> dict[str, Any]:
     """For the provenance."""
     return {
-        "segments": len(problem.segments),
-        "cost_before": solution.cost_before,
-        "cost_after": solution.cost_after,
-        "evaluations": solution.evaluations,
         "residual_rms": by_name(problem.channels, solution.scales),
         "pull": solution.pull,
         "decision": "refined",

@@ -44,10 +44,6 @@ class Refinement:
         check_flag(self.staggered, "staggered")
         check_number(self.pull, "pull", at_least=0.0)
 
-    def plain(self) -> dict[str, Any]:
-        """The settings for the provenance."""
-        return {name: getattr(self, name) for name in self.options}
-
 
 def whole_trials() -> Refinement:
     """Output error of whole trials, each a single segment."""

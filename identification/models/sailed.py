@@ -80,7 +80,11 @@ class Sailed:
         model = self.blank.with_coefficients(values)
         if covariance is None:
             return model
-        return replace(model, covariance=self.prior.covariance(covariance), draws=None)
+        return replace(
+            model,
+            covariance=self.prior.covariance(covariance),
+            draws=None,
+        )
 
     def n_errors(self, which: Integers | None = None) -> float:
         """Independent errors of a channel: one for each length that a ship sails."""
@@ -94,7 +98,11 @@ class Sailed:
         """
         coefficients = self.prior.coefficients(points)
         numbers = self.blank.ship_numbers()
-        ships = np.repeat(numbers[:, None], len(points), axis=1)
+        ships = np.repeat(
+            numbers[:, None],
+            len(points),
+            axis=1,
+        )
         ships[self._rows] = self._matrix @ coefficients.T
         return np.concatenate(
             [self._errors(part, ships) for part in self._parts(which)]
@@ -120,7 +128,11 @@ class Sailed:
             errors = lanes[:, :, 0]
             slopes = (lanes[:, :, 1:] - errors[:, :, None]) / step
         errors = np.clip(np.nan_to_num(errors, nan=LARGEST), -LARGEST, LARGEST)
-        slopes = np.nan_to_num(slopes, posinf=0.0, neginf=0.0)
+        slopes = np.nan_to_num(
+            slopes,
+            posinf=0.0,
+            neginf=0.0,
+        )
         return Linearised(errors.ravel(), slopes.reshape(errors.size, -1))
 
     def most_probable(
@@ -153,9 +165,13 @@ class Sailed:
         for begin in range(0, ships.shape[1], LANES):
             tile = ships[:, begin : begin + LANES]
             n_ships = tile.shape[1]
-            spare = np.repeat(tile[:, -1:], LANES - n_ships, axis=1)
+            full = np.pad(
+                tile,
+                ((0, 0), (0, LANES - n_ships)),
+                mode="edge",
+            )
             starts = in_all_lanes(part.start)  # the ships move on from them
-            states = sail_lanes(self.blank, part, np.hstack([tile, spare]), starts)
+            states = sail_lanes(self.blank, part, full, starts)
             # at the first sample the ships have not moved yet
             simulated = states[1:, self._columns, :n_ships]
             tiles.append(simulated - part.measured[1:, :, None])

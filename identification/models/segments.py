@@ -1,6 +1,6 @@
 """Stretches of trials, each of which a model sails from a start of its own."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -91,30 +91,22 @@ def cut(
     an `interval` apart, in ship lengths; where it is 0, all. Coarse ones are integrated
     in steps as long as that.
     """
-    duration = lengths * model.travel_time
     least_step = interval * model.travel_time
-    shifts = (0.0, 0.5) if staggered else (0.0,)
     segments = []
     for index, trial in enumerate(trials):
         for piece in between_gaps(trial, model.particulars):
             recorded = _recorded(index, piece, model)
-            for rows in _segment_rows(piece.t, duration, shifts, least_step):
-                longest_step = least_step if coarse else None
-                segment = _segment(recorded, rows, channels, model, longest_step)
-                segments.append(segment)
+            every = max(int(least_step / usual_step(piece.t) + 1e-9), 1)
+            for shift in (0.0, 0.5) if staggered else (0.0,):
+                edges = segment_edges(piece.t, lengths * model.travel_time, shift)
+                for first, last in pairwise(edges):
+                    rows = slice(first, last + 1, every)
+                    segments.append(
+                        _segment(
+                            recorded, rows, channels, model, least_step * coarse or None
+                        )
+                    )
     return segments
-
-
-def _segment_rows(
-    t: Floats, duration: float, shifts: Sequence[float], least_step: float
-) -> Iterator[slice]:
-    """Samples of each segment of a record, a least step apart, s."""
-    sampling_steps = least_step / usual_step(t)
-    every = max(int(sampling_steps + 1e-9), 1)
-    for shift in shifts:
-        edges = segment_edges(t, duration, shift)
-        for first, last in pairwise(edges):
-            yield slice(first, last + 1, every)
 
 
 def segment_edges(t: Floats, duration: float, shift: float) -> Integers:
@@ -124,21 +116,22 @@ def segment_edges(t: Floats, duration: float, shift: float) -> Integers:
     on. Segments of fewer than five samples are joined. None where nothing is left.
     """
     fewest = 5
-    span = t[-1] - t[0]
-    skipped = shift * duration
+    span, skipped = t[-1] - t[0], shift * duration
     if skipped >= span:
-        return np.zeros(0, dtype=np.int64)
-
+        return np.zeros(
+            0,
+            dtype=int,
+        )
     count = max(round(span / duration - shift), 1)
-    parts = np.arange(count) * (span - skipped) / count
-    begins = t[0] + skipped + parts
-    firsts = np.searchsorted(t, begins)
-    last = len(t) - 1
-    if last < fewest:
-        return np.array([firsts[0], last])
-
-    edges = np.append(firsts, last)
-    long_enough = np.diff(edges) >= fewest
+    begins = t[0] + skipped + np.arange(count) * (span - skipped) / count
+    firsts, last = np.searchsorted(t, begins), len(t) - 1
+    long_enough = (
+        np.diff(
+            firsts,
+            append=last,
+        )
+        >= fewest
+    )
     long_enough[0] = True  # what is too short joins the segment before it
     return np.append(firsts[long_enough], last)
 
@@ -202,7 +195,8 @@ def _segment(
     sampled = np.searchsorted(grid, t)
     samples[sampled] = np.arange(len(t))
 
-    blocks = _block_starts(t, BLOCK * model.travel_time)
+    per_block = max(int(BLOCK * model.travel_time / usual_step(t)), 1)
+    blocks = np.arange(0, len(t), per_block)
     return Segment(
         trial=recorded.index,
         inputs=_inputs(recorded, grid, model),
@@ -214,42 +208,20 @@ def _segment(
     )
 
 
-def _block_starts(t: Floats, duration: float) -> Integers:
-    """First sample of each block of a duration, s, at most, or of one sample."""
-    sampling_steps = duration / usual_step(t)
-    per_block = max(int(sampling_steps), 1)
-    return np.arange(0, len(t), per_block)
-
-
 def _inputs(recorded: _Recorded, grid: Floats, model: ShipModel) -> Floats:
     """Rudder, shaft and wind at times of a grid, as in `Segment.inputs`."""
     trial = recorded.trial
-    rudder = recorded.rudder(grid)
-    shaft = np.zeros(len(grid))
-    if "n" in trial:
-        shaft = np.interp(grid, trial.t, trial["n"])
-
-    columns = [grid, rudder, shaft]
-    wind = wind_accelerations(trial, model.dynamics)
-    for acceleration in wind.T:
-        column = np.interp(grid, trial.t, acceleration)
-        columns.append(column)
-    return np.column_stack(columns)
+    shaft = trial["n"] if "n" in trial else np.zeros(len(trial))
+    sampled = [shaft, *wind_accelerations(trial, model.dynamics).T]
+    between = [np.interp(grid, trial.t, values) for values in sampled]
+    return np.column_stack([grid, recorded.rudder(grid), *between])
 
 
 def _grid(t: Floats, longest_step: float, corners: Floats) -> Floats:
     """Times of integration, s: samples, points between, and corners of the rudder."""
-    sampling = np.diff(t)
-    steps = np.ceil(sampling / longest_step - 1e-9)
-    counts = np.maximum(steps, 1).astype(int)
-
-    points = [t[-1]]
-    for begin, duration, count in zip(t[:-1], sampling, counts, strict=True):
-        parts = np.arange(count)
-        between = begin + duration * parts / count
-        points.extend(between)
-
-    after_first = corners > t[0]
-    before_last = corners < t[-1]
-    inside = corners[after_first & before_last]
-    return np.union1d(points, inside)
+    counts = np.maximum(np.ceil(np.diff(t) / longest_step - 1e-9), 1.0).astype(int)
+    first = np.repeat(np.arange(len(t) - 1), counts)
+    part = np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
+    between = t[first] + np.diff(t)[first] * part / counts[first]
+    inside = corners[(corners > t[0]) & (corners < t[-1])]
+    return np.union1d(np.append(between, t[-1]), inside)

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,40 +19,18 @@ AUTO = "auto"
 LEAST_SIMILARITY = 0.5
 
 
-class Features(NamedTuple):
-    """Quantities that ships are compared by; nan for what is not known."""
-
-    block_coefficient: float
-    length_by_beam: float
-    beam_by_draught: float
-    inverse_froude_number: float  # sqrt(g L) / V
-    rudder_area_by_side: float  # rudder area by length and draught
-
-
 def similarity_vector(particulars: Particulars) -> Floats:
-    """Features of a ship in the order of `Features`, shape (5,).
+    """What ships are compared by, shape (5,); nan for what is not known.
 
-    Mei 2019 prints the fourth as L/V0 in seconds, with which a model of 7 m is like no
-    ship at all; here it is sqrt(g L)/V0.
+    Block coefficient, length by beam, beam by draught, inverse Froude number, and
+    rudder area by length and draught. Mei 2019 prints the fourth as L/V0 in seconds,
+    with which a model of 7 m is like no ship at all; here it is sqrt(g L)/V0.
     """
-
-    def known(name: str) -> float:
-        value = particulars[name]
-        return np.nan if value is None else float(value)
-
+    names = ("block_coefficient", "beam", "draught", "speed", "rudder_area")
+    known = (particulars[name] for name in names)
+    C_b, B, T, V, A = (np.nan if value is None else float(value) for value in known)
     L = particulars.length
-    B = known("beam")
-    T = known("draught")
-    V = known("speed")
-    gravity = 9.81
-    features = Features(
-        block_coefficient=known("block_coefficient"),
-        length_by_beam=L / B,
-        beam_by_draught=B / T,
-        inverse_froude_number=np.sqrt(gravity * L) / V,
-        rudder_area_by_side=known("rudder_area") / (L * T),
-    )
-    return np.array(features)
+    return np.array([C_b, L / B, B / T, np.sqrt(9.81 * L) / V, A / (L * T)])
 
 
 def correlations(
@@ -120,11 +98,12 @@ def _evaluable(
 ) -> dict[str, ShipModel]:
     """The candidates that can be evaluated at some channels, if these are known."""
     with_roll = channels is None or {"p", "phi"} <= set(channels)
-    ships = {}
-    for name in candidates:
-        ship = load_model(name)
-        if with_roll or "phi" not in ship.state_names:
-            ships[name] = ship
+    ships = {name: load_model(name) for name in candidates}
+    ships = {
+        name: ship
+        for name, ship in ships.items()
+        if with_roll or "phi" not in ship.state_names
+    }
     if not ships:
         raise InputError(
             "reference_model: expected a ship that can be evaluated at"
@@ -158,10 +137,13 @@ def _with_rudder_area(name: str, ship: ShipModel) -> Particulars:
     if name not in by_length_and_draught:
         return p
     area = by_length_and_draught[name] * p.length * p.draught
-    return replace(p, rudder_area=area)
+    return replace(
+        p,
+        rudder_area=area,
+    )
 
 
-def with_usual_hull(ship: Particulars) -> Particulars:
+def with_usual_hull(ship: Particulars | Mapping[str, Any]) -> Particulars:
     """Particulars with absent beam, draught and block coefficient of a usual hull.
 
     A beam of L / 6.2, a draught of B / 2.7 and a block coefficient of 0.75 lie between
@@ -169,6 +151,8 @@ def with_usual_hull(ship: Particulars) -> Particulars:
     leads to the block coefficient. Boats below 30 m differ too much, and keep what is
     known.
     """
+    if not isinstance(ship, Particulars):
+        ship = Particulars.from_mapping(ship)
     shortest = 30.0
     if ship.length < shortest:
         return ship

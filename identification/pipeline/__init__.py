@@ -40,7 +40,10 @@ def identify(
         For trials that excite nothing, lack channels or samples, and for particulars
         that do not suffice.
     """
-    asked = Options(*arguments, **options)
+    asked = Options(
+        *arguments,
+        **options,
+    )
     if asked.kernel is None and asked.structure not in (AUTO, MMG):
         return by_regression(trials, asked)
 

@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from identification.estimators.covariance import without_trials
 from identification.estimators.estimator import FitTask
 from identification.judging.rudder_bias import with_bias
@@ -26,13 +24,10 @@ from identification.pipeline.evaluation import (
 from identification.pipeline.options import Options
 from identification.pipeline.pose import pose
 from identification.pipeline.result import IdentificationResult
-from identification.samples.prediction import is_yaw_alone
 from identification.samples.problem import Problem, held_out
 from shipgym import ShipModel, Trial, list_structures
-from shipgym.arrays import Floats
 from shipgym.ships import Structure, get_structure
 from shipgym.ships.structures import GREY_BOX
-from shipgym.trials.resampling import usual_step
 
 if TYPE_CHECKING:
     from identification.models.refine import Refined
@@ -72,20 +67,16 @@ class RegressionFit:
         """
         refined = self.refined
         if refined is None or refined.covariance is None:
-            estimators, _ = without_trials(
-                self.fit.estimators,
-                self.problem.samples,
-                trials,
-            )
+            samples = self.task.samples
+            estimators, _ = without_trials(self.fit.estimators, samples, trials)
             return with_coefficients(self.fit.model, estimators)
-        others = np.setdiff1d(np.arange(len(self.problem.used)), trials)
-        of_others = np.isin(self.problem.samples.trial, others)
-        task = FitTask(
-            samples=self.problem.samples.select(of_others),
-            blank=self.task.blank,
-            trials=[self.task.trials[place] for place in others],
+        task = self.task.without(trials)
+        again = _refined(
+            self.fit,
+            task,
+            self.method,
+            rounds=1,
         )
-        again = _refined(self.fit, task, self.method, rounds=1)
         assert again is not None
         return again.fit.model
 
@@ -109,7 +100,6 @@ class RegressionFit:
             provenance,
             options,
             self.without,
-            self._by_clock(),
         )
 
     @property
@@ -120,31 +110,6 @@ class RegressionFit:
             return self.method.name
         return get_method(refinement.start).name
 
-    def _by_clock(self) -> Floats | float:
-        """Change of the coefficients where the rudder is late by what a step hides.
-
-        Of responses that are fitted to headings, whose own errors are smaller. A rudder
-        that is logged at the end of its step differs by half a step from one logged at
-        its beginning.
-        """
-        trials = self.task.trials
-        derived = all("r" in trial.derived for trial in trials)
-        if self.refined is None or not (derived and is_yaw_alone(self.model)):
-            return 0.0
-        late = replace(self.task, trials=[_with_late_rudder(trial) for trial in trials])
-        again = _refined(self.fit, late, self.method, rounds=1)
-        assert again is not None
-        moved = list(again.fit.model.coefficients.values())
-        found = list(self.model.coefficients.values())
-        return np.subtract(moved, found)
-
-
-def _with_late_rudder(trial: Trial) -> Trial:
-    """The trial with a rudder that is late by the standard deviation of a step."""
-    late = usual_step(trial.t) / np.sqrt(12.0)
-    delta = np.interp(trial.t - late, trial.t, trial["delta"])
-    return trial.with_channels({"delta": delta})
-
 
 def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationResult:
     """Fit the regression of each equation, guard the model, and refine it if asked.
@@ -153,7 +118,10 @@ def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationRe
     differs from zero.
     """
     if options.method_is_default and differentiates_heading(trials, options):
-        options = replace(options, method=_by_heading(trials))
+        options = replace(
+            options,
+            method=_by_heading(trials),
+        )
     found = fit_regression(trials, options)
     biased = with_rudder_bias(found, options)
     if biased is None:
@@ -216,7 +184,13 @@ def fit_regression(trials: Sequence[Trial], options: Options) -> RegressionFit:
     refined = _refined(fit, task, method)
     if refined is not None:
         fit = refined.fit
-    return RegressionFit(problem, task, method, fit, refined)
+    return RegressionFit(
+        problem,
+        task,
+        method,
+        fit,
+        refined,
+    )
 
 
 def _refined(

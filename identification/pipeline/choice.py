@@ -14,12 +14,12 @@ from identification.judging.selection import (
     simplest,
 )
 from identification.models.refinement import Refinement, whole_trials
-from identification.models.similarity import AUTO, with_usual_hull
+from identification.models.similarity import with_usual_hull
 from identification.pipeline.options import MAP, Options, name_of
 from identification.pipeline.result import IdentificationResult
 from identification.progress import counted
 from identification.samples.folds import pieces
-from shipgym import InputError, Particulars, Trial
+from shipgym import InputError, Trial
 from shipgym.ships.structures import GREY_BOX, MMG
 
 TABLES = (
@@ -77,14 +77,24 @@ def select(
     fitted, with the first reason.
     """
     to_fit = [trial for trial in trials if trial.use == "fit"]
-    parts = list(trials)
-    held_out = "each trial in turn"
     single = len(to_fit) == 1
+    parts, held_out = list(trials), "each trial in turn"
     if single:
         parts = [part.with_(kind=None) for part in pieces(to_fit[0])]
         held_out = "each third of the only trial"
-    attempts = _Attempts(fit, parts, options)
-    attempts.add_all()
+    attempts = _Attempts(
+        fit,
+        parts,
+        options,
+    )
+    free = options.method_is_default
+    for structure in counted("structures", STRUCTURES):
+        attempts.add(structure, _usual_method(structure, options))
+    if not attempts.ranked:
+        raise InputError(next(iter(attempts.refused.values())))
+    tables = [one for one in attempts.by_rank() if one.structure in REFINED]
+    if free and tables:
+        attempts.add(tables[0].structure, Refinement())
 
     ranked = attempts.by_rank()
     best = simplest(ranked)
@@ -100,37 +110,29 @@ def select(
     found = Choice(own, whole, report)
     if options.rudder_bias == "none":
         return found
-    biased = f"{best.structure}-bias"
-    if biased in STRUCTURES and options.method_is_default:
-        return _response_with_bias(found, biased, fit, trials)
     return _with_bias(found, fit, trials)
 
 
 def _with_bias(choice: Choice, fit: FitTrials, trials: Sequence[Trial]) -> Choice:
-    """The same table with a constant, where it has none and the bias differs from 0."""
-    table = with_bias(choice.fit.model, choice.fit.problem)
+    """The same table with a constant, where it has none and the bias differs from 0.
+
+    Of a response by the standard error of the bias in the fit to all trials: in what is
+    predicted from the start of a short piece it hardly shows.
+    """
+    options, report = choice.options, choice.report
+    biased = f"{name_of(options.structure)}-bias"
+    is_response = biased in RESPONSES and isinstance(options.method, Refinement)
+    table = biased if is_response else with_bias(choice.fit.model, choice.fit.problem)
     if table is None:
         return choice
-    options = replace(choice.options, structure=table)
+    options = replace(options, structure=table)
     other = fit(trials, options)
-    return Choice(options, other, choice.report) if other.stable else choice
-
-
-def _response_with_bias(
-    choice: Choice, structure: str, fit: FitTrials, trials: Sequence[Trial]
-) -> Choice:
-    """The same structure with the bias of the rudder, where that differs from 0.
-
-    By the standard error of the bias in the fit to all trials: in what is predicted
-    from the start of a short piece it hardly shows.
-    """
-    options = replace(choice.options, structure=structure, method=whole_trials())
-    other = fit(trials, options)
-    bias = other.result(options).metrics.get("rudder_bias")
-    report = choice.report | {"rudder_bias": bias}
-    if bias is None or not bias["significant"] or not other.stable:
-        return choice._replace(report=report)
-    return Choice(options, other, report)
+    if is_response:
+        bias = other.result(options).metrics.get("rudder_bias")
+        report = report | {"rudder_bias": bias}
+        if bias is None or not bias["significant"]:
+            return choice._replace(report=report)
+    return Choice(options, other, report) if other.stable else choice
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,37 +146,18 @@ class _Attempts:
     refused: dict[str, str] = field(default_factory=dict)  # why, by name
     fits: dict[str, tuple[Options, Candidate]] = field(default_factory=dict)  # by name
 
-    def add_all(self) -> None:
-        """Try all structures, each by its usual methods, the best table by others too.
-
-        Raises InputError where none can be fitted.
-        """
-        free = self.options.method_is_default
-        for structure in counted("structures", STRUCTURES):
-            method = self.options.method
-            if free:
-                method = _usual_method(structure, method)
-            self.add(structure, method)
-        if not self.ranked:
-            first_reason = next(iter(self.refused.values()))
-            raise InputError(first_reason)
-
-        best = next((one for one in self.by_rank() if one.structure in REFINED), None)
-        if free and best is not None:
-            self.add(best.structure, Refinement())
-
     def add(self, structure: str, method: Any) -> None:
         """Try a structure and a method, or remember why it cannot be fitted."""
-        reference = reference_of(structure, self.options.reference_model)
+        by_reference = structure in (GREY_BOX, MMG)
         own = replace(
             self.options,
             structure=structure,
             method=method,
-            reference_model=reference,
+            reference_model=self.options.reference_model if by_reference else None,
             prior=self.options.prior if structure == MMG else None,
         )
-        if structure in (GREY_BOX, MMG) and own.particulars is not None:
-            own = replace(own, particulars=_of_usual_hull(own.particulars))
+        if by_reference and own.particulars is not None:
+            own = replace(own, particulars=with_usual_hull(own.particulars))
         by = MAP if structure == MMG else name_of(method)
         name = fit_name(structure, by)
         try:
@@ -190,24 +173,10 @@ class _Attempts:
         return sorted(self.ranked, key=lambda fit: fit.rank)
 
 
-def _usual_method(structure: str, method: Any) -> Any:
-    """The method that a structure is fitted by, where none is named."""
-    if structure in RESPONSES:
+def _usual_method(structure: str, options: Options) -> Any:
+    """The method that a structure is fitted by: the one that is named, if any."""
+    if options.method_is_default and structure in RESPONSES:
         return whole_trials()
-    return RM_SVM if structure == GREY_BOX else method
-
-
-def _of_usual_hull(given: Particulars | Mapping[str, Any]) -> Particulars:
-    """Particulars by which a reference ship or formulas are found."""
-    if not isinstance(given, Particulars):
-        given = Particulars.from_mapping(given)
-    return with_usual_hull(given)
-
-
-def reference_of(structure: str, named: Any) -> Any:
-    """The reference ship of a structure that knows one, as named; None for others."""
-    if structure == GREY_BOX:
-        return named or AUTO
-    if structure == MMG:
-        return named
-    return None
+    if options.method_is_default and structure == GREY_BOX:
+        return RM_SVM
+    return options.method

@@ -10,7 +10,6 @@ import shipgym
 from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.linear import LinearRegressor
 from identification.judging.uncertainty import Uncertainty
-from identification.models.methods import METHODS, make_method
 from identification.models.prior_knowledge import PriorKnowledge
 from identification.models.refinement import Refinement
 from identification.samples.preprocess import Preprocessing
@@ -25,7 +24,6 @@ Given = Particulars | Mapping[str, Any] | None  # particulars, as `identify` tak
 DEFAULT_METHOD = "tls-svm"
 MAP = "map"  # the method of the MMG form: maximum a posteriori
 AUTO = "auto"  # the structure that is chosen by trials held out
-BLACK_BOX = "linear"  # the structure beneath a kernel where none is named
 
 #: Stages of an identification that are one object each.
 STAGES: dict[str, type] = {
@@ -48,8 +46,8 @@ class Options:
     ----------
     structure : str, Structure or None
         Terms of the model: a name of `shipgym.list_structures`, a table, or "auto": the
-        structure and method that predict held-out trials best. None is "abkowitz";
-        beneath a kernel it is "linear", or "grey-box" where a reference model is given.
+        structure and method that predict held-out trials best. None is "abkowitz", with
+        a kernel "grey-box".
     method : str or estimator
         How the coefficients are fitted: a name of
         `identification.models.methods.METHODS`, such as "tls-svm", an estimator
@@ -130,7 +128,8 @@ class Options:
                 f" rudders, got {self.steering!r}"
             )
         if self.structure is None:
-            object.__setattr__(self, "structure", self._unnamed_structure())
+            unnamed = "abkowitz" if self.kernel is None else GREY_BOX
+            object.__setattr__(self, "structure", unnamed)
         if not isinstance(self.structure, Structure):
             check_text(self.structure, "structure")
         if self.kernel is not None and self.structure == AUTO:
@@ -151,17 +150,15 @@ class Options:
                 " out, or choose 'mmg' or 'auto'"
             )
         check_flag(self.guarded, "guarded")
+        if not isinstance(self.hold_out, Sequence):
+            raise InputError(
+                f"hold_out: expected a list of names of trials, got {self.hold_out!r}"
+            )
         if self.name is not None:
             check_text(self.name, "name")
         speed = self.service_shaft_speed
         if speed is not None:
             check_number(speed, "service_shaft_speed", above=0.0, hint="1/s")
-
-    def _unnamed_structure(self) -> str:
-        """The structure where none is named."""
-        if self.kernel is None:
-            return "abkowitz"
-        return BLACK_BOX if self.reference_model is None else GREY_BOX
 
     @property
     def method_is_default(self) -> bool:
@@ -180,61 +177,21 @@ def name_of(value: Any) -> str:
     return type(value).__name__
 
 
-def provenance_settings(options: Options) -> dict[str, Any]:
-    """Settings for the provenance: those of samples, preprocessing and method."""
-    return {
-        "samples": plain(options.samples),
-        "preprocessing": plain(options.preprocessing),
-        "guarded": options.guarded,
-        "method": changed_settings(options.method),
-    }
-
-
-def changed_settings(method: Any) -> dict[str, Any]:
-    """Settings in which a method differs from the default of its name."""
-    if isinstance(method, str):
-        return {}
-    settings = method_settings(method)
-    name = name_of(method)
-    if name not in METHODS:
-        return settings
-    default = method_settings(make_method(name))
-    return {
-        setting: value
-        for setting, value in settings.items()
-        if value != default[setting]
-    }
-
-
-def method_settings(method: Any) -> dict[str, Any]:
-    """Settings of an estimator or a refinement, as JSON knows them."""
-    if isinstance(method, LinearRegressor):
-        return _plain_attributes(method, method.options)
-    if isinstance(method, Refinement):
-        own = _plain_attributes(method, method.options)
-        return own | method_settings(method.start)
-    if hasattr(method, "get_params"):
-        settings: dict[str, Any] = plain(method.get_params(deep=False))
-        return settings
-    return {}
-
-
-def _plain_attributes(value: Any, names: Iterable[str]) -> dict[str, Any]:
-    return {name: plain(getattr(value, name)) for name in names}
-
-
 def whole_call(options: Options, trials: Sequence[Trial]) -> dict[str, Any]:
     """The whole call for settings.json, trials by name, use and hash."""
-    used = []
-    for trial in trials:
-        record = {"name": trial.name, "use": trial.use, "sha256": trial.raw.sha256}
-        used.append(record)
-    arguments = [item.name for item in fields(options)]
     return {
         "software": f"shipgym {shipgym.__version__}",
-        **_plain_attributes(options, arguments),
-        "trials": used,
+        **settings_of(options, [item.name for item in fields(options)]),
+        "trials": [
+            {"name": trial.name, "use": trial.use, "sha256": trial.raw.sha256}
+            for trial in trials
+        ],
     }
+
+
+def settings_of(value: Any, names: Iterable[str]) -> dict[str, Any]:
+    """Attributes of an object by name, as JSON knows them."""
+    return {name: plain(getattr(value, name)) for name in names}
 
 
 def plain(value: Any) -> Any:
@@ -245,7 +202,7 @@ def plain(value: Any) -> Any:
         return value if np.isfinite(value) else None
     if isinstance(value, ShipModel | Trial):
         return value.name
-    if isinstance(value, Particulars | SteeringGear | Structure):
+    if hasattr(value, "to_dict"):
         return value.to_dict()
     if isinstance(value, Mapping):
         return {key: plain(item) for key, item in value.items()}
@@ -253,9 +210,8 @@ def plain(value: Any) -> Any:
         return plain(value.tolist())
     if isinstance(value, list | tuple | set | frozenset):
         return [plain(item) for item in value]
-    if hasattr(value, "fit") or isinstance(value, Refinement):
-        return {"name": name_of(value), **method_settings(value)}
+    if hasattr(value, "get_params"):
+        return {"name": name_of(value), **plain(value.get_params(deep=False))}
     if is_dataclass(value):
-        names = [item.name for item in fields(value)]
-        return _plain_attributes(value, names)
+        return settings_of(value, [item.name for item in fields(value)])
     return repr(value)

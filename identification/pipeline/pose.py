@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -46,83 +45,26 @@ def pose(trials: Sequence[Trial], options: Options) -> Problem:
     if is_yaw_alone:
         used = [_at_service_speed(trial, particulars) for trial in used]
         everything = [_at_service_speed(trial, particulars) for trial in everything]
-    ship = _checked_ship(particulars, used, table)
+    check_trials(used, table)
+    ship = _ship(particulars, used, table)
+    for trial in used:
+        check_scale(trial, ship, f"trial {trial.name!r}")
     shaft = _shaft_speed(options.service_shaft_speed, used, table)
-    sampling = _sampling(options)
-    samples = build_samples(
-        used, structure=table, particulars=ship, shaft_speed=shaft, **sampling
-    )
-    check_samples(samples, used, table)
-
-    return Problem(
-        trials=tuple(everything),
-        used=tuple(used),
-        blank=_blank(
-            options,
-            table=table,
-            ship=ship,
-            shaft=shaft,
-            used=used,
-        ),
-        table=table,
-        samples=samples,
-        similarity=similarity,
-        sea=sea,
-        sampling=sampling,
-    )
-
-
-def _sampling(options: Options) -> dict[str, Any]:
-    """Keywords of `build_samples` that the options give."""
-    return {
+    sampling = {
         "samples": options.samples.rule,
         "window": options.samples.window,
         "smoothing": options.preprocessing.smoothing,
         "gear": options.steering,
     }
-
-
-def _checked_ship(
-    particulars: Given, used: Sequence[Trial], table: Structure
-) -> Particulars:
-    """The ship's particulars, once her trials suit the structure and her scale."""
-    check_trials(used, table)
-    ship = _ship(particulars, used, table)
-    for trial in used:
-        check_scale(trial, ship, f"trial {trial.name!r}")
-    return ship
-
-
-def _at_service_speed(trial: Trial, particulars: Given) -> Trial:
-    """A trial without sway as if it had none, without surge as if at service speed."""
-    known = trial.channels.keys()
-    aside = {"v": np.zeros(len(trial))}
-    if "v" in known:
-        return trial
-    if "u" in known:
-        return trial.with_channels(aside)
-    speed = None if particulars is None else particulars.get("speed")
-    if speed is None:
-        return trial
-
-    ahead = np.full(len(trial), float(speed))
-    return trial.with_channels({"u": ahead, **aside})
-
-
-def _blank(
-    options: Options,
-    table: Structure,
-    ship: Particulars,
-    shaft: float,
-    used: Sequence[Trial],
-) -> ShipModel:
-    """The model but for its coefficients, with the envelope of the trials behind it."""
+    samples = build_samples(
+        used, structure=table, particulars=ship, shaft_speed=shaft, **sampling
+    )
+    check_samples(samples, used, table)
     gear = options.steering
     if gear is None:
         gear = estimated_gear(used) if table.has_rudder else SteeringGear()
-
     dynamics = get_dynamics(MMG) if table is MMG_CHANNELS else table
-    return ShipModel(
+    blank = ShipModel(
         name=options.name or ship["name"],
         structure=table.name,
         particulars=ship,
@@ -132,14 +74,37 @@ def _blank(
         dynamics=dynamics,
         envelope=_envelope(used, table, ship),
     )
+    return Problem(
+        trials=tuple(everything),
+        used=tuple(used),
+        blank=blank,
+        table=table,
+        samples=samples,
+        similarity=similarity,
+        sea=sea,
+        sampling=sampling,
+    )
+
+
+def _at_service_speed(trial: Trial, particulars: Given) -> Trial:
+    """A trial without sway as if it had none, without surge as if at service speed."""
+    if "v" in trial:
+        return trial
+    missing = {"v": np.zeros(len(trial))}
+    speed = None if particulars is None else particulars.get("speed")
+    if "u" not in trial:
+        if speed is None:
+            return trial
+        missing["u"] = np.full(len(trial), float(speed))
+    return trial.with_channels(missing)
 
 
 def _envelope(trials: Sequence[Trial], table: Structure, ship: Particulars) -> Envelope:
     """Envelope of the trials; a model of yaw alone keeps to the service speed."""
-    channels = {}
-    for name in ("u", "v", "r", "delta"):
-        of_trials = [trial[name] for trial in trials]
-        channels[name] = np.concatenate(of_trials)
+    channels = {
+        name: np.concatenate([trial[name] for trial in trials])
+        for name in ("u", "v", "r", "delta")
+    }
     if not {"u", "v"} & table.equations.keys():
         channels["u"] = np.full_like(channels["r"], ship["speed"])
         channels["v"] = np.zeros_like(channels["r"])
@@ -196,9 +161,7 @@ def _ship(particulars: Given, trials: Sequence[Trial], table: Structure) -> Part
 
 def _speed_at_start(trials: Sequence[Trial]) -> float:
     """Median of the speeds at which the trials start, m/s."""
-    starts = []
-    for trial in trials:
-        starts.append(_service(trial.t, np.hypot(trial["u"], trial["v"])))
+    starts = [_service(one.t, np.hypot(one["u"], one["v"])) for one in trials]
     speed = float(np.median(starts))
     if speed <= 0.0:
         raise InputError(
@@ -214,16 +177,15 @@ def _service(t: Floats, values: Floats) -> float:
 
     Steady is what changes by less than a twentieth within a tenth of the trial.
     """
-    start = float(values[0])
     rows = max(3, t.size // 10)
-    steady = [start]
-    for begin in range(0, t.size - rows + 1, rows):
-        part = values[begin : begin + rows]
-        if np.ptp(part) < 0.05 * np.abs(part).max():
-            steady.append(float(np.mean(part)))
-    at_rest = 0.2  # of the largest one
-    largest = max(steady)
-    return largest if start < at_rest * largest else start
+    parts = np.split(values[: t.size // rows * rows], t.size // rows)
+    steady = [
+        float(np.mean(part))
+        for part in parts
+        if np.ptp(part) < 0.05 * np.abs(part).max()
+    ]
+    start, largest = float(values[0]), max([float(values[0]), *steady])
+    return largest if start < 0.2 * largest else start
 
 
 def _shaft_speed(

@@ -9,14 +9,11 @@ from typing import Any
 
 from identification.estimators.estimator import Estimators
 from identification.estimators.kernel_residual import KernelResidual
-from identification.estimators.rm_svm import RMSVM
 from identification.judging.extrapolation import beyond_trials
-from identification.models.grey_box import explained_samples
 from identification.models.guard import GuardedFit, reasons_unstable
 from identification.models.kernel_fit import (
     INPUT_CHANNELS,
     fit_kernel,
-    stabilised,
 )
 from identification.models.maximum_a_posteriori import (
     MMGFit,
@@ -36,7 +33,6 @@ from identification.pipeline.evaluation import (
 )
 from identification.pipeline.options import (
     AUTO,
-    BLACK_BOX,
     MAP,
     Options,
     name_of,
@@ -48,7 +44,6 @@ from identification.samples.preprocess import smoothed_channels
 from identification.samples.problem import Problem, held_out
 from identification.samples.still_water import in_still_water
 from shipgym import InputError, ShipModel, Trial
-from shipgym.checks import quoted
 from shipgym.models.catalogue import fitted_box
 from shipgym.ships import GreyBox, Structure
 from shipgym.ships.structures import GREY_BOX, MMG
@@ -111,10 +106,21 @@ def by_kernel(
             "uncertainty: expected 'analytic' with a kernel, got 'posterior'; leave"
             " one of them out"
         )
-    beneath = reference_options(options)
+    method = name_of(options.method)
+    by_lssvm = ("tls-svm", "ls-svm", "rm-svm")
+    if options.structure == GREY_BOX and method not in by_lssvm:
+        raise InputError(
+            "method: expected none with a kernel on a grey box, which is fitted by"
+            f" LS-SVM, got {method!r}; leave it out"
+        )
+    beneath = replace(options, kernel=None)
     problem = pose(trials, beneath)
     _check_beneath(problem.table)
-    reference, box = _reference_box(trials, beneath, problem)
+    reference = problem.blank
+    box = problem.table
+    if not isinstance(box, GreyBox):
+        reference = identified(trials, beneath).model
+        box = fitted_box(reference)
     smoothing = options.preprocessing.smoothing
     found = fit_kernel(
         kernel,
@@ -132,65 +138,19 @@ def by_kernel(
     )
     reasons = reasons_unstable(found.model, problem.used)
     fit = _guard_report(found.model, found.estimators, reasons)
-    named = replace(options, structure=beneath.structure)
-    provenance = provenance_of(named, name_of(options.method), fit, problem)
+    provenance = provenance_of(options, method, fit, problem)
     provenance["kernel"] = found.report
     return with_uncertainty(fit, None, problem, provenance, options)
 
 
 def _check_beneath(table: Structure) -> None:
     """Refuse a structure that cannot take a kernel."""
-    equations = set(table.equations)
-    if equations != set("uvr"):
-        listed = ", ".join(table.equations)
+    if set(table.equations) != set("uvr"):
         raise InputError(
             "kernel: expected a structure beneath it with equations of u, v and r, got"
-            f" {table.name!r} with those of {listed}; choose 'linear' or 'abkowitz',"
-            " or leave the kernel out"
+            f" {table.name!r} with those of {', '.join(table.equations)}; choose"
+            " 'linear' or 'abkowitz', or leave the kernel out"
         )
-
-
-def _reference_box(
-    trials: Sequence[Trial], options: Options, problem: Problem
-) -> tuple[ShipModel, GreyBox]:
-    """Reference ship beneath a kernel, and her table; fitted where none is named."""
-    if isinstance(problem.table, GreyBox):
-        return problem.blank, problem.table
-
-    model = identified(trials, options).model
-    if options.structure == BLACK_BOX:
-        model = stabilised(model)
-    return model, fitted_box(model)
-
-
-def reference_options(options: Options) -> Options:
-    """The options by which the reference ship beneath a kernel is identified.
-
-    A grey box names hers.
-    """
-    method = options.method
-    # Methods that an identification with a kernel may have; those of its reference
-    # ship.
-    kernel_methods = ("tls-svm", "ls-svm", "rm-svm", "output-error", MAP)
-    if name_of(method) not in kernel_methods:
-        raise InputError(
-            f"method: expected one of {quoted(kernel_methods)} with a kernel, got"
-            f" {name_of(method)!r}; choose 'rm-svm' or 'ls-svm', or leave the kernel"
-            " out"
-        )
-    if isinstance(method, RMSVM):
-        raise InputError(
-            "method: expected 'rm-svm' by its name with a kernel, which is fitted by"
-            " LS-SVM only, got an RMSVM with settings; leave them out"
-        )
-
-    if options.structure != GREY_BOX and name_of(method) == RMSVM.name:
-        raise InputError(
-            "method: expected 'rm-svm' with structure 'grey-box', whose correction it"
-            f" fits, got structure {name_of(options.structure)!r}; leave the method"
-            " out: the kernel is fitted by LS-SVM"
-        )
-    return replace(options, kernel=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,18 +187,14 @@ class SimulationFit:
     def result(
         self, options: Options, sea: Mapping[str, Any] | None = None
     ) -> IdentificationResult:
-        """The model with provenance and predictions; its regression is of the model.
+        """The model with provenance and predictions.
 
-        On the model's own accelerations, that is. `sea`: what is known of current and
-        wind, where it was taken out before.
+        `sea`: what is known of current and wind, where it was taken out before.
         """
         options = checked_mmg(options)
-        problem = self.problem
-        model = self.model
-        samples, estimators = explained_samples(problem.used, model, **problem.sampling)
-        problem = replace(problem, samples=samples, blank=model)
-        problem = replace(problem, sea={**problem.sea, **(sea or {})})
-        fit = _guard_report(model, estimators, self.reasons)
+        problem, model = self.problem, self.model
+        problem = replace(problem, blank=model, sea={**problem.sea, **(sea or {})})
+        fit = _guard_report(model, {}, self.reasons)
         provenance = provenance_of(options, MAP, fit, problem)
         report = dict(self.fit.report)
         asked = options.uncertainty
@@ -249,10 +205,15 @@ class SimulationFit:
             model, posterior = with_posterior(model, problem.used, prior, asked)
             report |= {"uncertainty": "posterior", "posterior": posterior}
         elif asked.model_error and self.stable:
-            model, beyond = beyond_trials(model, self.without, self.problem.used)
+            model, beyond = beyond_trials(model, self.without, problem.used)
             report["model_error"] = report["model_error"] | beyond
-        provenance |= report
-        return evaluated(model, fit, problem, provenance, options)
+        return evaluated(
+            model,
+            fit,
+            problem,
+            provenance | report,
+            options,
+        )
 
 
 def by_simulation(trials: Sequence[Trial], options: Options) -> IdentificationResult:
@@ -266,7 +227,10 @@ def fit_simulation(trials: Sequence[Trial], options: Options) -> SimulationFit:
     problem = pose(trials, options)
     asked = options.prior or PriorKnowledge()
     if options.reference_model is not None:
-        asked = replace(asked, source=options.reference_model)
+        asked = replace(
+            asked,
+            source=options.reference_model,
+        )
     return SimulationFit(problem, fit_mmg(problem.blank, problem.used, asked))
 
 

@@ -1,14 +1,11 @@
 """Rows that text and pages show of a fit, and the text that `summary` prints."""
 
 from collections.abc import Mapping
-from math import degrees
 from typing import Any, NamedTuple
-
-from rich.table import Table
 
 from identification.judging.fit import Fit
 from identification.judging.sentences import error_source, findings
-from identification.judging.warnings import exactly_collinear, undetermined
+from identification.judging.warnings import inseparable
 from identification.text import as_text, lined_table
 from shipgym import ShipModel
 from shipgym.pages.numbers import MINUS, NONE, fixed, number
@@ -48,7 +45,12 @@ def summary_table(fit: Fit) -> str:
     )
     for row in coefficient_rows(fit):
         coefficients.add_row(*row[:4])
-    ship = lined_table("Ship and steering gear", "name", ">value", "source")
+    ship = lined_table(
+        "Ship and steering gear",
+        "name",
+        ">value",
+        "source",
+    )
     for name, source, value in quantities(fit.model):
         ship.add_row(name, value, source)
     shown = [
@@ -57,11 +59,8 @@ def summary_table(fit: Fit) -> str:
         ship,
         f"The standard errors come from {error_source(provenance)}.",
         *findings(provenance),
-        *undetermined(fit),
-        *exactly_collinear(fit),
+        *inseparable(fit),
     ]
-    if "reference" in fit.metrics:
-        shown.append(_against_reference(fit))
     return as_text(*shown)
 
 
@@ -82,20 +81,11 @@ def _verdict(fit: Fit) -> str:
 
 def kernel_text(report: Mapping[str, Any]) -> str:
     """Kernel added to the reference ship, in words: its weights tell nothing."""
-    errors = [
-        f"{name} {_heading_error(error)}"
-        for name, error in report["heading_errors_held_out"].items()
-    ]
     return (
         f"Kernel: {report['centres']} radial basis functions of length"
         f" {report['length']:g} in {report['features']} features an equation, C"
-        f" {report['C']:g}; heading held out, rms: {', '.join(errors)}"
+        f" {report['C']:g}"
     )
-
-
-def _heading_error(error: float | None) -> str:
-    """An error of the heading, rad, in degrees."""
-    return "ran away" if error is None else f"{degrees(error):.2g} deg"
 
 
 def are_derivatives(model: ShipModel) -> bool:
@@ -128,44 +118,40 @@ def coefficient_rows(fit: Fit) -> list[CoefficientRow]:
         if error > 0.0:
             t = fixed(value / error, 1)
             significant = abs(value / error) >= 2.0
-        rows.append(CoefficientRow(name, own, deviation, t, significant))
+        rows.append(
+            CoefficientRow(
+                name,
+                own,
+                deviation,
+                t,
+                significant,
+            )
+        )
     return rows
 
 
 def quantities(model: ShipModel) -> list[tuple[str, str, str]]:
     """Particulars, added masses and steering gear: name, where from, and value."""
-    ship, gear = model.particulars, model.steering
-    rows = []
-
-    def add(name: str, value: str, estimated: bool) -> None:
-        rows.append((name, "estimated" if estimated else "given", value))
-
+    ship = model.particulars
+    rows = _gear_rows(model)
     for name, (words, unit, factor) in PARTICULARS.items():
-        value = ship[name]
-        if value is not None:
-            digits = f"{factor * value:.5g}".replace("-", MINUS)
-            add(words, f"{digits} {unit}", name in ship.estimated)
+        if ship[name] is not None:
+            digits = f"{factor * ship[name]:.5g}".replace("-", MINUS)
+            rows.append((words, name in ship.estimated, f"{digits} {unit}"))
     for name in ADDED_MASSES:
-        value = ship[name]
-        if value is not None:
-            add(f"{name}, 10⁻⁵", fixed(value / PRIME, 1), name in ship.estimated)
+        if ship[name] is not None:
+            value = fixed(ship[name] / PRIME, 1)
+            rows.append((f"{name}, 10⁻⁵", name in ship.estimated, value))
+    sources = {True: "estimated", False: "given"}
+    return [(name, sources[guess], value) for name, guess, value in rows]
+
+
+def _gear_rows(model: ShipModel) -> list[tuple[str, bool, str]]:
+    """Steering gear: name, whether estimated, and value."""
+    gear = model.steering
     estimated = (model.provenance or {}).get("steering") == "estimated"
-    add("rudder limit", f"{number(gear.rudder_limit_deg)} deg", estimated)
-    add("rudder rate", f"{number(gear.rudder_rate_deg_s)} deg/s", estimated)
-    add("rudder lag", f"{number(gear.time_constant, 2)} s", estimated)
-    return rows
-
-
-def _against_reference(fit: Fit) -> Table:
-    """Predicted headings of the trials, compared with the bare reference ship's."""
-    reference = fit.metrics["reference"]
-    title = (
-        "Open-loop heading, root mean square error, beside the bare reference ship"
-        f" '{reference['name']}'"
-    )
-    table = lined_table(title, "trial", "use", ">model", ">reference")
-    for name, metrics in fit.metrics["trials"].items():
-        bare = reference["trials"][name]
-        errors = [_heading_error(one["rmse"]["psi"]) for one in (metrics, bare)]
-        table.add_row(name, metrics["use"], *errors)
-    return table
+    return [
+        ("rudder limit", estimated, f"{number(gear.rudder_limit_deg)} deg"),
+        ("rudder rate", estimated, f"{number(gear.rudder_rate_deg_s)} deg/s"),
+        ("rudder lag", estimated, f"{number(gear.time_constant, 2)} s"),
+    ]

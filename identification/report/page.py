@@ -28,6 +28,7 @@ def report_page(fit: Fit) -> str:
         fit=fit_view(fit),
         figures=figures,
         instability=instability,
+        trials=fit.settings["trials"],
     )
 
 

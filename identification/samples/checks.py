@@ -14,8 +14,7 @@ from shipgym.ships import Structure
 def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
     """Refuse trials from which a structure cannot be identified.
 
-    There are none, one lacks a channel or has times that nearly coincide, or no rudder
-    ever moves.
+    There are none, one lacks a channel, or no rudder ever moves.
     """
     if structure.captive:
         raise InputError(
@@ -30,7 +29,6 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
         )
     for trial in trials:
         _check_channels(trial, structure)
-        _check_steps(trial)
         _check_rudder(trial)
     if structure.has_rudder and all(is_still(trial) for trial in trials):
         _refuse_still(trials[0])
@@ -48,22 +46,6 @@ def _check_channels(trial: Trial, structure: Structure) -> None:
             f"trial {trial.name!r}: channel {channel!r} is missing, structure"
             f" {structure.name!r} needs {', '.join(needed)}; name its column, or"
             f' leave the trial out (use = "skip"){hint}'
-        )
-
-
-def _check_steps(trial: Trial) -> None:
-    """Refuse a row that was written twice: a step of less than 1e-4 of the usual."""
-    steps = np.diff(trial.t)
-    usual = float(np.median(steps))
-    row = int(np.argmin(steps))
-    shortest = steps[row]
-    if shortest < 1e-4 * usual:
-        begin = trial.t[row]
-        end = trial.t[row + 1]
-        raise InputError(
-            f"trial {trial.name!r}: expected samples about {usual:.3g} s apart, got"
-            f" {shortest:.2g} s from {begin:.12g} to {end:.12g} s;"
-            " remove the repeated row"
         )
 
 
@@ -86,16 +68,17 @@ def is_still(trial: Trial) -> bool:
     moves by less than half a degree, or six times the noise up to 3 degrees.
     """
     delta = trial["delta"]
-    width = min(5, len(delta))
-    windows = sliding_window_view(delta, width)
-    medians = np.median(windows, axis=1)
-    moved = np.ptp(medians)
-
-    noise = preprocess.noise_level(trial.t, delta)
-    most_scatter = np.radians(3.0)
-    scatter = min(6.0 * noise, most_scatter)
-    least_move = np.radians(0.5)
-    return bool(moved < max(least_move, scatter))
+    windows = sliding_window_view(delta, min(5, len(delta)))
+    moved = np.degrees(
+        np.ptp(
+            np.median(
+                windows,
+                axis=1,
+            )
+        )
+    )
+    scatter = np.degrees(6.0 * preprocess.noise_level(trial.t, delta))
+    return bool(moved < max(0.5, min(scatter, 3.0)))
 
 
 def _refuse_still(trial: Trial) -> None:

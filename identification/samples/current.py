@@ -16,6 +16,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from identification.samples.runs_on_grid import (
     STEP,
@@ -27,12 +28,11 @@ from identification.samples.surge_sway import (
     DEVIATION,
     MEAN,
     N_COEFFICIENTS,
-    Coefficients,
     SurgeSwayInputs,
     accelerations,
 )
 from shipgym import Trial
-from shipgym.arrays import Floats, Integers
+from shipgym.arrays import Floats
 from shipgym.trials.navigation import rotate_to_body
 
 DIFFERENCE = 1e-4  # of finite differences
@@ -79,41 +79,24 @@ def estimate_current(
 
 
 def _covariance(problem: "_Problem", fit: "_Fit", n_parts: int) -> Floats:
-    """Covariance of the unknowns, with that by each part of each trial left out."""
+    """Covariance of the unknowns, with that by each part of each trial left out.
+
+    Without it the estimate changes by one step of Gauss & Newton.
+    """
     information = problem.information(fit.slopes)
     changes = []
-    for k, seen in enumerate(problem.runs.seen.T):
-        is_measured = np.isfinite(seen[0])
-        windows = np.flatnonzero(is_measured)
+    for trial, seen in enumerate(problem.runs.seen.T):
+        windows = np.flatnonzero(np.isfinite(seen[0]))
         for part in np.array_split(windows, n_parts):
-            change = _change_without(
-                part,
-                trial=k,
-                fit=fit,
-                information=information,
-            )
+            residuals = fit.residuals[part, :, trial].ravel()
+            slopes = fit.slopes[part, :, trial].reshape(len(residuals), -1)
+            left = information - slopes.T @ slopes
+            change = np.linalg.solve(left, slopes.T @ residuals)
             changes.append(change)
-
     n_changes = len(changes)
     inflation = (n_changes - 1) ** 2 / n_changes
     scatter = np.cov(np.transpose(changes))
-    of_noise = np.linalg.inv(information)
-    return np.asarray(scatter * inflation + of_noise)
-
-
-def _change_without(
-    windows: Integers,
-    trial: int,
-    fit: "_Fit",
-    information: Floats,
-) -> Floats:
-    """One step of Gauss & Newton to the estimate without some windows of a trial."""
-    n_unknowns = len(fit.x)
-    slopes = fit.slopes[windows, :, trial].reshape(-1, n_unknowns)
-    residuals = fit.residuals[windows, :, trial].ravel()
-    score = slopes.T @ residuals
-    information_left = information - slopes.T @ slopes
-    return np.asarray(np.linalg.solve(information_left, score))
+    return np.asarray(scatter * inflation + np.linalg.inv(information))
 
 
 class _Fit(NamedTuple):
@@ -159,10 +142,16 @@ class _Problem:
         start, are moved by `DIFFERENCE`.
         """
         c = _coefficients_by_lane(x[:N_COEFFICIENTS])
-        u, v = self._starts_by_lane(x, n_lanes=len(c.X_0))
+        u, v = self._starts_by_lane(x, n_lanes=c.shape[1])
         surge, sway = [u], [v]
         for now, then in pairwise(self.runs.inputs):
-            u, v = _midpoint_step(u, v, now, then, c)
+            u, v = _midpoint_step(
+                u,
+                v,
+                now,
+                then,
+                c,
+            )
             surge.append(u)
             sway.append(v)
 
@@ -222,63 +211,32 @@ class _Problem:
             slopes[:, 1, k, east] = 1.0
         return slopes
 
-    def fitted(self, most_rounds: int = 20, enough: float = 1e-3) -> _Fit:
+    def fitted(self) -> _Fit:
         """Fit by Levenberg & Marquardt; each round renews the residuals' scale."""
-        x = np.zeros(len(self.weights))
-        damping = 1e-2
-        scale = 0.1
-        errors, slopes = self.errors(x)
-        for _ in range(most_rounds):
-            residuals = errors / scale
-            before = self._cost(x, residuals)
-            moved = x + self._step(
-                x,
-                residuals=residuals,
-                slopes=slopes / scale,
-                damping=damping,
-            )
-            new_errors, new_slopes = self.errors(moved)
-            after = self._cost(moved, new_errors / scale)
-            if after < before:
-                x = moved
-                errors = new_errors
-                slopes = new_slopes
-                damping = max(0.1 * damping, 1e-9)
-                scale = self._scale(errors)
-            else:
-                damping *= 10.0
-            if abs(before - after) < enough * before:
-                break
-        return _Fit(
-            x=x,
-            slopes=slopes / scale,
-            residuals=errors / scale,
-        )
+        x, scale = np.zeros(len(self.weights)), 0.1
+        for _ in range(3):
+
+            def residuals(x: Floats, scale: float = scale) -> Floats:
+                errors, _ = self.errors(x)
+                return np.append(errors.ravel() / scale, self.weights * x)
+
+            def jacobian(x: Floats, scale: float = scale) -> Floats:
+                _, slopes = self.errors(x)
+                of_data = -slopes.reshape(-1, len(x)) / scale
+                return np.vstack([of_data, np.diag(self.weights)])
+
+            x = least_squares(
+                residuals, x, jacobian, ftol=1e-3, xtol=1e-6, max_nfev=10
+            ).x
+            errors, slopes = self.errors(x)
+            scale = self._scale(errors)
+        return _Fit(x, slopes / scale, errors / scale)
 
     def _scale(self, errors: Floats) -> float:
         """Standard deviation of the errors, at least that of the sensors' rounding."""
-        is_measured = np.isfinite(self.runs.seen)
-        n_measured = int(is_measured.sum())
+        n_measured = int(np.isfinite(self.runs.seen).sum())
         freedom = max(n_measured - len(self.weights), 1)
-        variance = np.sum(errors**2) / freedom
-        rounding = 0.003
-        return max(float(np.sqrt(variance)), rounding)
-
-    def _step(
-        self,
-        x: Floats,
-        residuals: Floats,
-        slopes: Floats,
-        damping: float,
-    ) -> Floats:
-        """Damped step of Gauss & Newton from x."""
-        J = slopes.reshape(-1, len(x))
-        from_prior = self.weights**2 * x
-        downhill = J.T @ residuals.ravel() - from_prior
-        hessian = self.information(slopes)
-        diagonal = np.diag(np.diag(hessian))
-        damped = hessian + damping * diagonal
-        return np.asarray(np.linalg.solve(damped, downhill))
+        return max(float(np.sqrt(np.sum(errors**2) / freedom)), 0.003)
 
     def information(self, slopes: Floats) -> Floats:
         """Inverse covariance of the unknowns by the slopes and the prior."""
@@ -286,26 +244,16 @@ class _Problem:
         of_prior = np.diag(self.weights**2)
         return J.T @ J + of_prior
 
-    def _cost(self, x: Floats, residuals: Floats) -> float:
-        from_prior = self.weights * x
-        misfit = np.sum(residuals**2)
-        return float(misfit + np.sum(from_prior**2))
 
-
-def _coefficients_by_lane(deviations: Floats) -> Coefficients:
-    """Coefficients of the lanes of `_Problem.simulated`, each of shape (n_lanes, 1).
+def _coefficients_by_lane(deviations: Floats) -> Floats:
+    """Coefficients of the lanes of `_Problem.simulated`, shape (18, n_lanes, 1).
 
     From deviations of the prior, shape (18,).
     """
     n_lanes = 1 + N_COEFFICIENTS + 2  # those given; each one moved; two starts moved
-    mean = MEAN + deviations * DEVIATION
-    values = np.tile(mean, (n_lanes, 1))
-    moved = np.arange(N_COEFFICIENTS)
-    own_lane = 1 + moved
-    values[own_lane, moved] += DIFFERENCE * DEVIATION
-
-    by_coefficient = values.T
-    return Coefficients(*by_coefficient[:, :, None])
+    values = np.tile(MEAN + deviations * DEVIATION, (n_lanes, 1))
+    values[1:-2] += DIFFERENCE * np.diag(DEVIATION)
+    return values.T[:, :, None]
 
 
 def _midpoint_step(
@@ -313,15 +261,15 @@ def _midpoint_step(
     v: Floats,
     now: Floats,
     then: Floats,
-    c: Coefficients,
+    c: Floats,
 ) -> tuple[Floats, Floats]:
     """One step of the midpoint rule, kept within what a ship does."""
-    surge, sway = accelerations(u, v, SurgeSwayInputs(*now), c)
+    at_start = SurgeSwayInputs(*now)
+    surge, sway = accelerations(u, v, at_start, c)
+    half = SurgeSwayInputs(*(0.5 * (now + then)))
     u_half = u + 0.5 * STEP * surge
     v_half = v + 0.5 * STEP * sway
-
-    mean = 0.5 * (now + then)
-    surge, sway = accelerations(u_half, v_half, SurgeSwayInputs(*mean), c)
+    surge, sway = accelerations(u_half, v_half, half, c)
     u = u + STEP * surge
     v = v + STEP * sway
     return np.clip(u, -2.0, 3.0), np.clip(v, -2.0, 2.0)

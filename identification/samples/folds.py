@@ -15,30 +15,30 @@ LARGEST_RUDDER = "largest-rudder"
 FOLDS = (TRIALS, LARGEST_RUDDER)
 
 
-def of_largest_rudder(trials: Sequence[Trial], where: str) -> Flags:
-    """The trials with the largest rudder, to which the others are extrapolated.
+def largest_rudders(trials: Sequence[Trial]) -> Flags:
+    """Flags of the trials of the largest rudder, to a tenth.
 
     The hard turn is in no zigzag. How well small rudders predict larger ones is the
-    closest substitute in the data. `where`: the argument that asks for it. Raises
-    InputError if all of them have the same rudder, to a tenth.
+    closest substitute in the data.
     """
-    reached = [np.abs(trial["delta"]).max() for trial in trials]
-    rudders = np.array(reached, dtype=float)
-    hardest = rudders.max()
-    largest: Flags = rudders > 0.9 * hardest
+    reached = np.array([np.abs(trial["delta"]).max() for trial in trials])
+    found: Flags = reached > 0.9 * reached.max()
+    return found
+
+
+def _some_largest(trials: Sequence[Trial]) -> Flags:
+    """The same; InputError where all have one angle."""
+    largest = largest_rudders(trials)
     if largest.all():
-        angle = np.degrees(hardest)
         raise InputError(
-            f"{where}: expected some trials with less rudder than others for"
-            f" {LARGEST_RUDDER!r}, got {len(trials)} trials that all reach"
-            f" {angle:.3g} deg; take {TRIALS!r}, or add trials of"
-            " another rudder angle"
+            "folds: expected some trials with less rudder than others for"
+            f" {LARGEST_RUDDER!r}, got {len(trials)} of one angle; take {TRIALS!r}"
         )
     return largest
 
 
 def held_out_rows(
-    trials: Sequence[Trial], samples: Samples, folds: str
+    trials: Sequence[Trial], samples: Samples, folds: str = TRIALS
 ) -> Iterator[tuple[Flags, Trial]]:
     """Rows to fit, and the trial or the piece of the only trial that is held out.
 
@@ -46,24 +46,27 @@ def held_out_rows(
     """
     check_choice(folds, FOLDS, "folds")
     if folds == LARGEST_RUDDER:
-        largest = of_largest_rudder(trials, "folds")
-        rows = ~largest[samples.trial]
-        for index in np.flatnonzero(largest).tolist():
-            yield rows, trials[index]
+        largest = _some_largest(trials)
+        for is_largest, trial in zip(largest, trials, strict=True):
+            if is_largest:
+                yield ~largest[samples.trial], trial
     elif len(trials) > 1:
         for index, trial in enumerate(trials):
             yield samples.trial != index, trial
     else:
         end = samples.start + samples.duration
         for piece in pieces(trials[0]):
-            before = end <= piece.t[0]
-            after = samples.start >= piece.t[-1]
-            yield before | after, piece
+            first, *_, last = piece.t
+            yield (end <= first) | (samples.start >= last), piece
 
 
 def pieces(trial: Trial) -> list[Trial]:
     """Thirds of a trial, which are no manoeuvres."""
-    edges = np.linspace(0, len(trial), 4).astype(int)
+    edges = np.linspace(
+        0,
+        len(trial),
+        4,
+    ).astype(int)
     found = []
     for number, (begin, end) in enumerate(pairwise(edges.tolist()), start=1):
         piece = trial.part(

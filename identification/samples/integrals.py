@@ -63,17 +63,19 @@ def spline_integrals(
     Both break where the rudder has corners.
     """
     rule = _quadrature(t, rudder.corners)
-    at_nodes = _interpolated(
-        t,
-        channels=channels,
-        rudder=rudder,
-        times=rule.nodes.ravel(),
-    )
-    moment_weights = rule.weights * rule.to_end
+    times = rule.nodes.ravel()
+    at_nodes = {}
+    for name, values in channels.items():
+        if name == "delta":
+            at_nodes[name] = rudder(times)
+        elif name == "n":  # it may jump
+            at_nodes[name] = np.interp(times, t, values)
+        else:
+            at_nodes[name] = broken_spline(t, values, rudder)(times)
     found = Integrals({}, {})
     for equation, values in terms(at_nodes).items():
         found.terms[equation] = rule.integrated(values, rule.weights)
-        found.moments[equation] = rule.integrated(values, moment_weights)
+        found.moments[equation] = rule.integrated(values, rule.weights * rule.to_end)
     return found
 
 
@@ -102,7 +104,11 @@ def _quadrature(t: Floats, corners: Floats) -> _Quadrature:
     half = 0.5 * np.diff(edges)[:, None]
     nodes = middle[:, None] + half * NODES
 
-    following = np.searchsorted(t, middle, side="right")
+    following = np.searchsorted(
+        t,
+        middle,
+        side="right",
+    )
     ends = t[following]
     step = following - 1
     return _Quadrature(
@@ -111,25 +117,6 @@ def _quadrature(t: Floats, corners: Floats) -> _Quadrature:
         to_end=ends[:, None] - nodes,
         first_of_step=np.flatnonzero(np.diff(step, prepend=-1)),
     )
-
-
-def _interpolated(
-    t: Floats,
-    channels: Channels,
-    rudder: Rudder,
-    times: Floats,
-) -> dict[str, Floats]:
-    """Channels between their samples; a shaft speed, which may jump, is straight."""
-    found = {}
-    for name, values in channels.items():
-        if name == "delta":
-            found[name] = rudder(times)
-        elif name == "n":
-            found[name] = np.interp(times, t, values)
-        else:
-            spline = broken_spline(t, values, rudder)
-            found[name] = spline(times)
-    return found
 
 
 def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
@@ -152,7 +139,10 @@ def _broken_knots(t: Floats, rudder: Rudder) -> Floats:
     for corner, smoothness in zip(rudder.corners, rudder.smoothness, strict=True):
         multiplicity = DEGREE - 1 - int(smoothness)
         distances = np.abs(knots - corner)
-        nearest = np.argsort(distances, kind="stable")[:multiplicity]
+        nearest = np.argsort(
+            distances,
+            kind="stable",
+        )[:multiplicity]
         if len(nearest) < multiplicity or _is_far(t, knots[nearest], corner):
             continue
         kept = np.delete(knots, nearest)
@@ -165,36 +155,23 @@ def _broken_knots(t: Floats, rudder: Rudder) -> Floats:
 
 def _is_far(t: Floats, knots: Floats, corner: float) -> bool:
     """Return whether a knot is more than two samples away from a corner."""
-    at_corner = np.searchsorted(t, corner)
-    at_knots = np.searchsorted(t, knots)
-    samples_away = np.abs(at_knots - at_corner)
-    return bool(np.any(samples_away > 2))
+    away = np.searchsorted(t, knots) - np.searchsorted(t, corner)
+    return bool(np.any(np.abs(away) > 2))
 
 
 def _with_ends(t: Floats, knots: Floats, corners: list[float]) -> Floats:
     """Knots of the whole spline, with as many at either end as a cubic needs."""
-    inner = np.concatenate([knots, corners])
-    inner.sort()
-    multiplicity = DEGREE + 1
-    return np.pad(
-        inner,
-        pad_width=multiplicity,
-        constant_values=(t[0], t[-1]),
-    )
+    inner = np.sort(np.concatenate([knots, corners]))
+    return np.pad(inner, DEGREE + 1, constant_values=(t[0], t[-1]))
 
 
 def _is_solvable(t: Floats, knots: Floats) -> bool:
     """Return whether every basis function has a sample of its own.
 
-    Source: Schoenberg & Whitney 1953.
+    Source: Schoenberg & Whitney 1953. The first and the last have those at the ends.
     """
-    n_functions = len(t)
-    begins = knots[:n_functions]
-    ends = knots[DEGREE + 1 :]
-    has_sample = (begins < t) & (t < ends)
-    # the first and the last function have the samples at the ends
-    inner = has_sample[1:-1]
-    return bool(np.all(inner))
+    has_sample = (knots[: len(t)] < t) & (t < knots[DEGREE + 1 :])
+    return bool(np.all(has_sample[1:-1]))
 
 
 def twice_integrated(t: Floats, integrals: Floats, moments: Floats) -> Floats:

@@ -69,7 +69,11 @@ def with_start(model: ShipModel, trial: Trial) -> Trial:
     if not names or "psi" not in trial:
         return trial
     try:
-        state = _Start(model, opening, names).estimated()
+        state = _Start(
+            model,
+            opening,
+            names,
+        ).estimated()
     except UnstableModelError:
         return trial
     begun = {}
@@ -97,7 +101,11 @@ def _opening_of(trial: Trial, travel_time: float) -> _Opening:
     for name in ("psi", *"uvr", *"xy"):
         if name not in trial:
             continue
-        wrong = outliers(trial.t, trial[name], may_step=False)
+        wrong = outliers(
+            trial.t,
+            trial[name],
+            may_step=False,
+        )
         if name in trial.derived or wrong[0] or is_noisy(trial.t, [trial[name]]):
             inexact[name] = math.inf if wrong[0] else _first_error(trial, name)
         if name not in trial.derived:
@@ -120,13 +128,13 @@ def _first_error(trial: Trial, name: str) -> float:
         return 0.1 * float(np.ptp(values))
     noise = noise_level(trial.t, values)
     n_next = 8
-    t = trial.t[: n_next + 1] - trial.t[0]
-    if len(t) <= n_next:
+    if len(values) <= n_next:
         return noise
-    parabola = np.polyfit(t[1:], values[1 : n_next + 1], deg=2)
-    apart = abs(float(values[0] - parabola[-1]))
-    largest = 10.0 * noise  # five errors of the sample and of the parabola there
-    return noise if apart < largest else math.inf
+    t = trial.t[1 : n_next + 1] - trial.t[0]
+    parabola = np.polyfit(t, values[1 : n_next + 1], deg=2)
+    # within five errors of the sample and of the parabola there
+    is_sound = abs(float(values[0] - parabola[-1])) < 10.0 * noise
+    return noise if is_sound else math.inf
 
 
 class _Start:
@@ -137,19 +145,15 @@ class _Start:
         self.trial = opening.trial
         self.spreads = np.array([max(opening.inexact[name], 1e-9) for name in names])
         least = _least_errors(model, opening.measured)
-        self.floors = np.array(
-            list(least.values())
-        )  # errors that count as one at least
+        #: errors that count as one at least
+        self.floors = np.array(list(least.values()))
         self.measured = np.column_stack([self.trial[name] for name in least])
-        state_names = model.state_names
-        self.compared = [state_names.index(name) for name in least]
-        length, speed = model.particulars["length"], model.particulars["speed"]
-        scale_of = {"psi": 1.0, "r": speed / length, "x": length, "y": length}
-        self.places = [state_names.index(name) for name in names]
+        place = model.state_names.index
+        self.compared = [place(name) for name in least]
+        self.places = [place(name) for name in names]
         #: a small change of each state that is estimated, shape (n_names, n_state)
-        self.moves = np.zeros((len(names), len(state_names)))
-        for row, name in enumerate(names):
-            self.moves[row, state_names.index(name)] = 1e-4 * scale_of.get(name, speed)
+        self.moves = np.zeros((len(names), len(model.state_names)))
+        self.moves[range(len(names)), self.places] = _small_changes(model, names)
 
     def estimated(self) -> Floats:
         """State from which the model comes nearest, shape (n_state,).
@@ -163,8 +167,7 @@ class _Start:
         logged = first_state(self.model, self.trial)
         start = logged
         scales = self.floors
-        rows = np.arange(len(self.places))
-        prior = np.diag(self.moves[rows, self.places] / self.spreads)
+        prior = np.diag(self.moves.sum(axis=1) / self.spreads)
         for _ in range(3):
             errors, *moved = self._errors(np.vstack([start, start + self.moves]))
             changes = [((other - errors) / scales).ravel() for other in moved]
@@ -172,9 +175,17 @@ class _Start:
             by_start = np.vstack([np.array(changes).T, prior])
             beyond = (start - logged)[self.places] / self.spreads
             targets = np.concatenate([residuals, beyond])
-            excess, *_ = np.linalg.lstsq(by_start, targets, rcond=1e-6)
+            excess, *_ = np.linalg.lstsq(
+                by_start,
+                targets,
+                rcond=1e-6,
+            )
             start = start - excess @ self.moves
-            left = errors - np.tensordot(excess, np.array(moved) - errors, axes=1)
+            left = errors - np.tensordot(
+                excess,
+                np.array(moved) - errors,
+                axes=1,
+            )
             sizes = np.maximum(np.sqrt(np.mean(left**2, axis=0)), self.floors)
             scales = sizes * np.sqrt(len(left) / _independent(left))
         return start
@@ -189,13 +200,32 @@ class _Start:
         return np.asarray(errors[:, 1:])
 
 
+def _small_changes(model: ShipModel, names: list[str]) -> list[float]:
+    """Changes of states that matter little, SI units."""
+    length, speed = model.particulars["length"], model.particulars["speed"]
+    scale_of = {"psi": 1.0, "r": speed / length, "x": length, "y": length}
+    return [1e-4 * scale_of.get(name, speed) for name in names]
+
+
 def _independent(errors: Floats) -> Floats:
     """Number of independent errors of each channel, by those of neighbours.
 
     `errors`: shape (n_samples, n_channels).
     """
-    squares = np.sum(errors**2, axis=0) + 1e-30
-    together = np.sum(errors[1:] * errors[:-1], axis=0) / squares
+    squares = (
+        np.sum(
+            errors**2,
+            axis=0,
+        )
+        + 1e-30
+    )
+    together = (
+        np.sum(
+            errors[1:] * errors[:-1],
+            axis=0,
+        )
+        / squares
+    )
     correlation = np.clip(together, 0.0, 0.999)
     share = (1.0 - correlation) / (1.0 + correlation)
     return np.asarray(np.maximum(len(errors) * share, 1.0))

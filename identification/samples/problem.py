@@ -41,16 +41,12 @@ def held_out(trials: Any, names: str | Sequence[str]) -> Sequence[Trial]:
 
     Raises InputError for what is no list of trials of different names.
     """
-    candidates: list[Any] = [trials]
-    if not isinstance(trials, Trial | str):
-        candidates = list(trials)
-    strangers = [one for one in candidates if not isinstance(one, Trial)]
-    if isinstance(trials, Trial):
-        strangers = [trials]
-    if strangers:
+    is_single = isinstance(trials, Trial | str)
+    candidates: list[Any] = [None] if is_single else list(trials)
+    if not all(isinstance(one, Trial) for one in candidates):
         raise InputError(
             "trials: expected a list of Trials, such as ship.trials() of a ship file,"
-            f" got {strangers[0]!r}"
+            f" got {trials!r}"
         )
     known = [trial.name for trial in candidates]
     repeated = [name for name in known if known.count(name) > 1]
@@ -63,9 +59,7 @@ def held_out(trials: Any, names: str | Sequence[str]) -> Sequence[Trial]:
     for name in wanted:
         check_choice(name, known, "hold_out")
 
-    marked = []
-    for trial in candidates:
-        if trial.name in wanted:
-            trial = trial.with_(use="validate")
-        marked.append(trial)
-    return marked
+    return [
+        trial.with_(use="validate") if trial.name in wanted else trial
+        for trial in candidates
+    ]

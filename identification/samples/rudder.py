@@ -8,7 +8,6 @@ angle alone.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,18 +30,14 @@ class Rudder:
 
     Attributes
     ----------
-    t, delta : array of shape (n_samples,)
-        The samples, s and rad.
-    rate, time_constant : float
-        Of the gear that explains them, rad/s and s; 0 where none does.
-    follows_gear : bool
-        Whether a steering gear explains the samples; if not, the rudder is taken
-        straight between them.
-    before, after : array of shape (n_samples - 1,)
-        Order in the first and second part of each interval, rad; infinite where only
-        its side is known.
-    switch : array of shape (n_samples - 1,)
-        Time from the interval's start at which the order changes, s.
+    t, delta : array of shape (n_pieces,)
+        Times at which pieces begin, s, and the angle there, rad: those of the samples,
+        and of changes of the order between them; last the last sample.
+    orders : array of shape (n_pieces,)
+        Order of each piece, rad; infinite where only its side is known.
+    gear : GearResponse or None
+        The gear that explains the samples; None where none does: the rudder is then
+        taken straight between its samples.
     corners : array of shape (n_corners,)
         Times at which rate or acceleration of the rudder jump, s.
     smoothness : array of shape (n_corners,)
@@ -52,39 +47,19 @@ class Rudder:
 
     t: Floats
     delta: Floats
-    rate: float
-    time_constant: float
-    follows_gear: bool
-    before: Floats
-    after: Floats
-    switch: Floats
+    orders: Floats
+    gear: GearResponse | None
     corners: Floats
     smoothness: Integers
 
     def __call__(self, times: ArrayLike) -> Floats:
         """Rudder angle, rad, at times within the samples."""
         times = np.asarray(times, dtype=float)
-        if not self.follows_gear:
+        if self.gear is None:
             return np.asarray(np.interp(times, self.t, self.delta))
-        following = np.searchsorted(self.t, times, side="right")
-        last = len(self.t) - 2
-        interval = np.clip(following - 1, 0, last)
-        elapsed = times - self.t[interval]
-        return self.within(interval, elapsed)
-
-    def within(self, interval: Integers, elapsed: Floats) -> Floats:
-        """Angle, rad, some time after the start of intervals."""
-        gear = GearResponse(self.rate, self.time_constant)
-        first_part = np.minimum(elapsed, self.switch[interval])
-        at_switch = gear.angle(
-            start=self.delta[interval],
-            order=self.before[interval],
-            elapsed=first_part,
-        )
-        return gear.angle(
-            start=at_switch,
-            order=self.after[interval],
-            elapsed=elapsed - first_part,
+        piece = np.maximum(np.searchsorted(self.t, times, side="right") - 1, 0)
+        return self.gear.angle(
+            self.delta[piece], self.orders[piece], times - self.t[piece]
         )
 
 
@@ -96,20 +71,19 @@ def rebuild(t: ArrayLike, delta: ArrayLike, gear: SteeringGear | None = None) ->
     samples, and leave eight samples for each change of its order: with fewer it
     explains noise.
     """
-    t = np.asarray(t, dtype=float)
+    t = np.asarray(
+        t,
+        dtype=float,
+    )
     delta = np.asarray(delta, dtype=float)
-    response = estimate_gear(t, delta)
-    share = response.explained_share(t, delta)
+    candidates = [estimate_gear(t, delta)]
     if gear is not None:
-        given = GearResponse(gear.rate, gear.time_constant)
-        given_share = given.explained_share(t, delta)
-        if given_share >= share:
-            response = given
-            share = given_share
-    if share < 0.85:
+        candidates.insert(0, GearResponse(gear.rate, gear.time_constant))
+    shares = [response.explained_share(t, delta) for response in candidates]
+    if max(shares) < 0.85:
         return straight(t, delta)
 
-    rudder = _with_gear(t, delta, response)
+    rudder = _with_gear(t, delta, candidates[int(np.argmax(shares))])
     n_changes = int(np.sum(rudder.smoothness == 0))
     if not _reproduces_samples(rudder) or 8 * n_changes > len(t):
         return straight(t, delta)
@@ -117,176 +91,101 @@ def rebuild(t: ArrayLike, delta: ArrayLike, gear: SteeringGear | None = None) ->
 
 
 def _reproduces_samples(rudder: Rudder) -> bool:
-    """Whether each interval ends where the next one starts."""
-    steps = np.diff(rudder.t)
-    intervals = np.arange(len(steps))
-    ends = rudder.within(intervals, steps)
-    misses = np.abs(ends - rudder.delta[1:])
-    allowed = TOLERANCE * np.ptp(rudder.delta)
-    return bool(misses.max() <= allowed)
+    """Whether each piece ends where the next one starts."""
+    assert rudder.gear is not None
+    ends = rudder.gear.angle(
+        rudder.delta,
+        rudder.orders,
+        np.diff(rudder.t, append=0.0),
+    )
+    misses = np.abs(ends[:-1] - rudder.delta[1:])
+    return bool(misses.max() <= TOLERANCE * np.ptp(rudder.delta))
 
 
 def straight(t: Floats, delta: Floats) -> Rudder:
     """The rudder taken straight between its samples, for records with noise."""
     none = np.zeros(0)
-    return Rudder(
-        t=t,
-        delta=delta,
-        rate=0.0,
-        time_constant=0.0,
-        follows_gear=False,
-        before=none,
-        after=none,
-        switch=none,
-        corners=none,
-        smoothness=none.astype(np.int64),
-    )
-
-
-class _Corner(NamedTuple):
-    """A time at which rate (smoothness 0) or acceleration (1) of the rudder jumps."""
-
-    time: float
-    smoothness: int
-
-
-class _Orders(NamedTuple):
-    """Orders of the intervals, as of `Rudder`."""
-
-    before: Floats
-    after: Floats
-    switch: Floats
+    return Rudder(t, delta, none, None, none, none.astype(int))
 
 
 def _with_gear(t: Floats, delta: Floats, gear: GearResponse) -> Rudder:
     """The rudder of a gear, with the changes of its order."""
-    orders, corners = _changing_orders(t, delta, gear)
-    corners += _ramp_ends(gear, t, delta, orders)
-    inside = [corner for corner in sorted(corners) if t[0] < corner.time < t[-1]]
-    times = [corner.time for corner in inside]
-    smoothness = [corner.smoothness for corner in inside]
-    return Rudder(
-        t=t,
-        delta=delta,
-        rate=gear.rate,
-        time_constant=gear.lag,
-        follows_gear=True,
-        before=orders.before,
-        after=orders.after,
-        switch=orders.switch,
-        corners=np.array(times),
-        smoothness=np.array(smoothness, dtype=np.int64),
-    )
-
-
-def _changing_orders(
-    t: Floats, delta: Floats, gear: GearResponse
-) -> tuple[_Orders, list[_Corner]]:
-    """Orders of the intervals, and the corners where they change."""
     orders = gear.orders(t, delta)
     continues = goes_on(orders, delta).tolist()
     follows = [True, *continues, True]  # each interval the one before it
-    found = _Orders(
-        before=orders.copy(),
-        after=orders.copy(),
-        switch=np.diff(t),
-    )
-    corners: list[_Corner] = []
-    for k, is_continued in enumerate(follows[:-1]):
-        if is_continued:
+    pieces: list[tuple[float, float, float]] = []
+    corners: list[tuple[float, int]] = []
+    for k, order in enumerate(orders.tolist()):
+        begin, start = float(t[k]), float(delta[k])
+        pieces.append((begin, start, order))
+        # an order that changed on the sample goes on; a change in the interval before
+        # ends in this one
+        on_sample = follows[k + 1] and not np.isinf(order)
+        if follows[k] or (k > 1 and not follows[k - 1] and not on_sample):
             continue
-        time = float(t[k])
-        follows_on = follows[k + 1]
-        if follows_on and not np.isinf(orders[k]):
-            corners.append(_Corner(time, 0))  # the order changed on the sample
-            continue
-        if k > 1 and not follows[k - 1]:
-            continue  # the end of a change inside the interval before
-
-        first = orders[k - 1]
-        second = orders[min(k + 1, len(orders) - 1)]
-        elapsed = _switch_time(
-            gear,
-            start=delta[k],
-            end=delta[k + 1],
-            first=first,
-            second=second,
-            step=found.switch[k],
-        )
+        first, second = orders[k - 1], orders[min(k + 1, len(orders) - 1)]
+        elapsed = None
+        if not on_sample:
+            ends = float(t[k + 1] - t[k]), float(delta[k + 1])
+            elapsed = _switch_time(
+                gear,
+                start,
+                (first, second),
+                *ends,
+            )
         if elapsed is not None:
-            found.before[k] = first
-            found.after[k] = second
-            found.switch[k] = elapsed
-            time = float(t[k] + elapsed)
-        corners.append(_Corner(time, 0))
-    return found, corners
+            pieces[-1] = (begin, start, first)
+            at_switch = float(
+                gear.angle(
+                    start,
+                    first,
+                    elapsed,
+                )
+            )
+            begin += elapsed
+            pieces.append((begin, at_switch, second))
+        corners.append((begin, 0))
+
+    pieces.append((float(t[-1]), float(delta[-1]), float(orders[-1])))
+    begins, starts, ordered = np.array(pieces).T
+    with np.errstate(invalid="ignore"):
+        ramps = (np.abs(ordered - starts) - gear.rate * gear.lag) / gear.rate
+    ending = (ramps > 1e-9) & (
+        ramps
+        < np.diff(
+            begins,
+            append=begins[-1],
+        )
+    )
+    ends = begins[ending] + ramps[ending]
+    corners += [(time, int(gear.lag > 0.0)) for time in ends.tolist()]
+    inside = [corner for corner in sorted(corners) if t[0] < corner[0] < t[-1]]
+    times, smoothness = zip(*inside, strict=True) if inside else ((), ())
+    return Rudder(
+        begins, starts, ordered, gear, np.array(times), np.array(smoothness, dtype=int)
+    )
 
 
 def _switch_time(
     gear: GearResponse,
     start: float,
-    end: float,
-    first: float,
-    second: float,
+    orders: tuple[float, float],
     step: float,
+    end: float,
 ) -> float | None:
     """Time at which a second order has to follow the first to reach the end in a step.
 
     None if it never does.
     """
+    first, second = orders
 
     def miss(elapsed: float) -> float:
         at_switch = gear.angle(start, first, elapsed)
-        reached = gear.angle(at_switch, second, step - elapsed)
-        return float(reached - end)
+        return float(gear.angle(at_switch, second, step - elapsed) - end)
 
     if miss(0.0) * miss(step) > 0.0:
         return None
     return float(brentq(miss, 0.0, step, xtol=1e-15 * step))
-
-
-def _ramp_ends(
-    gear: GearResponse,
-    t: Floats,
-    delta: Floats,
-    orders: _Orders,
-) -> list[_Corner]:
-    """Times at which a ramp ends inside an interval."""
-    begins = t[:-1]
-    starts = delta[:-1]
-    switch = orders.switch
-    first = _ends_of_ramps(
-        gear,
-        begin=begins,
-        start=starts,
-        order=orders.before,
-        length=switch,
-    )
-    second = _ends_of_ramps(
-        gear,
-        begin=begins + switch,
-        start=gear.angle(starts, orders.before, switch),
-        order=orders.after,
-        length=np.diff(t) - switch,
-    )
-    smoothness = int(gear.lag > 0.0)
-    return [_Corner(float(time), smoothness) for time in (*first, *second)]
-
-
-def _ends_of_ramps(
-    gear: GearResponse,
-    begin: Floats,
-    start: Floats,
-    order: Floats,
-    length: Floats,
-) -> Floats:
-    """Times at which ramps end, of those that end within their part of an interval."""
-    distance = np.abs(order - start)
-    by_ramp = distance - gear.rate * gear.lag
-    ramp = by_ramp / gear.rate
-    inside = (ramp > 1e-9) & (ramp < length)
-    ends = begin + ramp
-    return ends[inside]
 
 
 def estimated_gear(trials: Sequence[Trial]) -> SteeringGear:
@@ -300,40 +199,25 @@ def estimated_gear(trials: Sequence[Trial]) -> SteeringGear:
     largest_deg = float(np.degrees(largest))
     limit_deg = min(max(35.0, largest_deg), 90.0)
 
-    exact = _exact_gears(trials)
-    if exact:
-        rate, lag = np.median(exact, axis=0).tolist()
-    else:
-        rate = _usual_rate(trials)
-        lag = 0.0
-    rate_deg = float(np.degrees(rate))
-    return SteeringGear(limit_deg, rate_deg, lag)
-
-
-def _exact_gears(trials: Sequence[Trial]) -> list[GearResponse]:
-    """Gears that explain the rudders of records without noise."""
-    found = []
+    exact = []
     for trial in trials:
-        velocities = [trial[name] for name in ("u", "v", "r")]
-        if is_noisy(trial.t, velocities):
-            continue
-        rudder = rebuild(trial.t, trial["delta"])
-        if rudder.follows_gear:
-            gear = GearResponse(rudder.rate, rudder.time_constant)
-            found.append(gear)
-    return found
+        if not is_noisy(trial.t, [trial[name] for name in ("u", "v", "r")]):
+            exact.append(rebuild(trial.t, trial["delta"]).gear)
+    known = [gear for gear in exact if gear is not None]
+    if known:
+        rate, lag = np.median(
+            known,
+            axis=0,
+        ).tolist()
+    else:
+        rate, lag = _usual_rate(trials), 0.0
+    return SteeringGear(limit_deg, float(np.degrees(rate)), lag)
 
 
 def _usual_rate(trials: Sequence[Trial]) -> float:
     """Median of the rates at which rudders of records with noise move fast, rad/s."""
-    by_trial = []
-    for trial in trials:
-        moves = np.diff(trial["delta"])
-        steps = np.diff(trial.t)
-        by_trial.append(np.abs(moves) / steps)
-    rates = np.concatenate(by_trial)
-
-    moving = rates[rates > 0.0]
-    fastest = float(np.quantile(moving, 0.995))
-    is_fast = rates >= 0.5 * fastest
-    return float(np.median(rates[is_fast]))
+    rates = np.concatenate(
+        [np.abs(np.diff(trial["delta"]) / np.diff(trial.t)) for trial in trials]
+    )
+    fastest = np.quantile(rates[rates > 0.0], 0.995)
+    return float(np.median(rates[rates >= 0.5 * fastest]))

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from identification.samples.gaps import FEWEST_SAMPLES, between_gaps
 from identification.samples.integrals import (
     Channels,
-    Integrals,
     spline_integrals,
     step_integrals,
     twice_integrated,
@@ -147,12 +146,7 @@ def build_samples(
         At service speed, 1/s, for terms that refer to it.
     """
     regression = _Regression(
-        structure=structure,
-        particulars=particulars,
-        sampling=Sampling(samples, window),
-        gear=gear,
-        smoothing=smoothing,
-        shaft_speed=shaft_speed,
+        structure, particulars, Sampling(samples, window), gear, smoothing, shaft_speed
     )
     parts = []
     for index, trial in enumerate(trials):
@@ -162,20 +156,21 @@ def build_samples(
 
 def _stacked(parts: Sequence[Samples], equations: Iterable[str]) -> Samples:
     """The rows of all parts, one after the other."""
-    features = {}
-    targets = {}
+
+    def joined(name: str) -> Any:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    features, targets = {}, {}
     for q in equations:
         features[q] = np.concatenate([part.features[q] for part in parts])
         targets[q] = np.concatenate([part.targets[q] for part in parts])
-
-    longest = max(part.window for part in parts)
     return Samples(
         features=features,
         targets=targets,
-        start=np.concatenate([part.start for part in parts]),
-        duration=np.concatenate([part.duration for part in parts]),
-        trial=np.concatenate([part.trial for part in parts]),
-        window=longest,
+        start=joined("start"),
+        duration=joined("duration"),
+        trial=joined("trial"),
+        window=max(part.window for part in parts),
     )
 
 
@@ -215,17 +210,20 @@ class _Regression:
     def _of_piece(self, trial: Trial, index: int, window: int) -> Samples:
         """The rows of a trial without gaps."""
         t = trial.t
-        names = self.structure.required_channels
-        channels = smoothed_channels(trial, names, self.smoothing)
+        structure = self.structure
+        names = structure.required_channels
+        channels = smoothed_channels(
+            trial,
+            names,
+            self.smoothing,
+        )
         windows = _Windows(len(t), window)
         features, targets = {}, {}
         for q, steps in self._terms_by_step(trial, channels).items():
             features[q] = windows.summed(steps)
             targets[q] = windows.changes(channels[q])
-            wind = f"wind_{q}dot"
-            if wind in trial:
-                by_wind = integral(t, trial[wind])
-                targets[q] -= windows.changes(by_wind)
+            if (wind := f"wind_{q}dot") in trial:
+                targets[q] -= windows.changes(integral(t, trial[wind]))
 
         rows = Samples(
             features=features,
@@ -235,63 +233,36 @@ class _Regression:
             trial=np.full(len(windows.first), index),
             window=window,
         )
-        if isinstance(self.structure, GreyBox):
-            rows = _without_reference(rows)
-        if "q" in self.structure.equations:
-            rows = without_memory(rows)
-        return rows
+        if isinstance(structure, GreyBox):
+            return _without_reference(rows)
+        return without_memory(rows) if "q" in structure.equations else rows
 
     def _terms_by_step(self, trial: Trial, channels: Channels) -> dict[str, Floats]:
         """Integrals of the terms over each step; the memory's follow those of `r`."""
-        terms, moments = self._integrals(trial, channels)
+        t, rule = trial.t, self.sampling.rule
+        if rule == "spline":
+            delta = trial["delta"]
+            known = self.structure.channels | self.structure.equations.keys()
+            recorded = [trial[name] for name in channels if name in known - {"delta"}]
+            noisy = is_noisy(t, recorded)
+            rudder = straight(t, delta) if noisy else rebuild(t, delta, self.gear)
+            found = spline_integrals(t, channels, self._terms, rudder)
+        else:
+            found = step_integrals(t, channels, self._terms, rule)
+        terms, moments = found
         if "q" in terms:
-            of_memory = terms.pop("q")
-            memory = twice_integrated(
-                trial.t,
-                integrals=of_memory,
-                moments=moments["q"],
-            )
+            memory = twice_integrated(t, terms.pop("q"), moments["q"])
             terms["r"] = np.hstack([terms["r"], memory])
         return terms
-
-    def _integrals(self, trial: Trial, channels: Channels) -> Integrals:
-        """Integrals of the terms over each step."""
-        t = trial.t
-        rule = self.sampling.rule
-        if rule != "spline":
-            return step_integrals(
-                t,
-                channels=channels,
-                terms=self._terms,
-                rule=rule,
-            )
-
-        delta = trial["delta"]
-        known = self.structure.channels | self.structure.equations.keys()
-        recorded = [trial[name] for name in channels if name in known - {"delta"}]
-        if is_noisy(t, recorded):
-            rudder = straight(t, delta)
-        else:
-            rudder = rebuild(t, delta, self.gear)
-        return spline_integrals(
-            t,
-            channels=channels,
-            terms=self._terms,
-            rudder=rudder,
-        )
 
     def _terms(self, channels: Channels) -> dict[str, Floats]:
         """The terms by equation; last, of a grey box, the reference's acceleration."""
         structure = self.structure
         motion = (channels, self.particulars, self.shaft_speed)
-        terms = {}
-        for q in structure.equations:
-            terms[q] = structure.features(q, *motion)
-
+        terms = {q: structure.features(q, *motion) for q in structure.equations}
         if isinstance(structure, GreyBox):
             known = structure.converted_accelerations(*motion)
-            for q, own in terms.items():
-                terms[q] = np.column_stack([own, known[q]])
+            terms = {q: np.column_stack([own, known[q]]) for q, own in terms.items()}
         return terms
 
 
@@ -302,7 +273,11 @@ class _Windows:
         half = max(steps // 2, 1)
         end = n_samples - steps
         self.steps = steps
-        self.first = np.arange(0, end, half)
+        self.first = np.arange(
+            0,
+            end,
+            half,
+        )
         self.last = self.first + steps
 
     def changes(self, values: Floats) -> Floats:
@@ -313,19 +288,21 @@ class _Windows:
         """Sum over each window of rows, one a step."""
         if self.steps == 1:
             return rows
-        sums = np.cumsum(rows, axis=0)
+        sums = np.cumsum(
+            rows,
+            axis=0,
+        )
         from_start = np.pad(sums, ((1, 0), (0, 0)))
         return self.changes(from_start)
 
 
 def _without_reference(rows: Samples) -> Samples:
     """Rows of a grey box, whose last feature, her reference's, goes to the targets."""
-    features = {}
-    targets = {}
-    for q, columns, target in rows.by_equation():
-        features[q] = columns[:, :-1]
-        targets[q] = target - columns[:, -1]
-    return replace(rows, features=features, targets=targets)
+    return replace(
+        rows,
+        features={q: X[:, :-1] for q, X, _ in rows.by_equation()},
+        targets={q: y - X[:, -1] for q, X, y in rows.by_equation()},
+    )
 
 
 def default_window(
@@ -348,7 +325,11 @@ def default_window(
         ratio = noise_ratio(trial.t, values)
         while ratio > NOISY and window < longest:
             window += 1
-            ratio = noise_ratio(trial.t, values, window)
+            ratio = noise_ratio(
+                trial.t,
+                values,
+                window,
+            )
     return window
 
 
@@ -377,17 +358,15 @@ def without_memory(rows: Samples) -> Samples:
     second = next_window[first]
     duration = rows.duration
     both = 0.5 * (duration[first] + duration[second])
-    mean_features = rows.features["r"] / duration[:, None]
-    features = mean_features[second] - mean_features[first]
-    features *= both[:, None]
 
-    mean_targets = rows.targets["r"] / duration
-    targets = mean_targets[second] - mean_targets[first]
-    targets *= both
+    def apart(values: Floats) -> Floats:
+        """Means of a window less those of the one before, times a window."""
+        means = (values.T / duration).T
+        return np.asarray(((means[second] - means[first]).T * both).T)
 
     chosen = rows.select(first)
     return replace(
         chosen,
-        features=chosen.features | {"r": features},
-        targets=chosen.targets | {"r": targets},
+        features=chosen.features | {"r": apart(rows.features["r"])},
+        targets=chosen.targets | {"r": apart(rows.targets["r"])},
     )

@@ -20,7 +20,12 @@ def check_current(option: Any) -> None:
     """Refuse a current that is neither a word nor a table of north and east, m/s."""
     currents = ("auto", "none")
     if not isinstance(option, Mapping):
-        check_choice(option, currents, "current", " or a table of north and east")
+        check_choice(
+            option,
+            currents,
+            "current",
+            " or a table of north and east",
+        )
         return
     check_keys(option, ("north", "east"), "current", ("north", "east"))
     for name, value in option.items():
@@ -61,48 +66,36 @@ def in_still_water(
         ship = Particulars.from_mapping(ship)
     remarks: list[str] = []
     report: dict[str, Any] = {}
-    free_running = {}
-    for trial in trials:
-        if trial.use != "skip" and trial.kind != "captive":
-            free_running[trial.name] = trial
-
-    found = _with_wind(
-        free_running,
-        ship=ship,
-        option=wind,
-        remarks=remarks,
-    )
-    wind_speeds = _mean_wind_speeds(found)
+    free_running = {
+        trial.name: trial
+        for trial in trials
+        if trial.use != "skip" and trial.kind != "captive"
+    }
+    found = _with_wind(free_running, ship, wind, remarks)
+    wind_speeds = {
+        name: float(trial["wind_speed"].mean())
+        for name, trial in found.items()
+        if {"wind_udot", "wind_speed"} <= trial.channels.keys()
+    }
     if wind_speeds:
         report["wind"] = {"option": wind, "mean_speeds": wind_speeds}
 
-    rows = _take_current_out(found, ship, current, remarks)
-    if rows:
-        report["currents"] = rows
+    speed = ship.speed or _starting_speed(found.values())
+    if current != "none" and speed > 0.0:
+        from identification.samples.trial_currents import without_current
+
+        rows = without_current(
+            found,
+            ship.length,
+            speed,
+            current,
+            remarks,
+        )
+        if rows:
+            report["currents"] = rows
     if remarks:
         report["sea_remarks"] = remarks
     return [found.get(trial.name, trial) for trial in trials], report
-
-
-def _take_current_out(
-    trials: dict[str, Trial],
-    ship: Particulars,
-    option: Any,
-    remarks: list[str],
-) -> dict[str, Any]:
-    """Take the current out of trials, where asked; a report on each."""
-    speed = ship.speed or _starting_speed(trials.values())
-    if option == "none" or not speed > 0.0:
-        return {}
-    from identification.samples.trial_currents import without_current
-
-    return without_current(
-        trials,
-        length=ship.length,
-        speed=speed,
-        option=option,
-        remarks=remarks,
-    )
 
 
 def _feels_sea(trial: Trial) -> bool:
@@ -110,27 +103,14 @@ def _feels_sea(trial: Trial) -> bool:
     return trial.over_ground or bool(columns & trial.channels.keys())
 
 
-def _mean_wind_speeds(trials: Mapping[str, Trial]) -> dict[str, float]:
-    """Mean wind speed of those trials with accelerations by it, m/s."""
-    speeds = {}
-    for name, trial in trials.items():
-        if {"wind_udot", "wind_speed"} <= trial.channels.keys():
-            mean = trial["wind_speed"].mean()
-            speeds[name] = float(mean)
-    return speeds
-
-
 def _starting_speed(trials: Iterable[Trial]) -> float:
     """Median speed over ground at the start of trials, m/s; 0 where none is known."""
-    starts = []
-    for trial in trials:
-        if {"u", "v"} <= trial.channels.keys():
-            ahead, aside = over_ground(trial)
-            start = np.hypot(ahead[0], aside[0])
-            starts.append(start)
-    if not starts:
-        return 0.0
-    return float(np.median(starts))
+    starts = [
+        np.hypot(*[component[0] for component in over_ground(trial)])
+        for trial in trials
+        if {"u", "v"} <= trial.channels.keys()
+    ]
+    return float(np.median(starts)) if starts else 0.0
 
 
 def _with_wind(

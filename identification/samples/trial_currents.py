@@ -84,19 +84,15 @@ def without_current(
         if taken_out:
             found[name] = through_water(found[name], *current.velocity)
         rows[name] = _row(current, taken_out, one_heading)
+    magnetic = [PurePath(t.name).name for t in trials if t.over_ground and t.magnetic]
+    if magnetic:
+        doubt = (
+            "the heading is magnetic and the variation would look like drift; write"
+            " variation_deg (east positive) in [sensors]"
+        )
+        doubtful[doubt] = magnetic
     for doubt, names in doubtful.items():
         remarks.append(f"{', '.join(names)}: no current is removed: {doubt}; {REMEDY}")
-    magnetic = [
-        PurePath(trial.name).name
-        for trial in trials
-        if trial.over_ground and trial.magnetic
-    ]
-    if magnetic:
-        remarks.append(
-            f"{', '.join(magnetic)}: no current is looked for, as the heading is"
-            " magnetic and the variation would look like drift; write variation_deg"
-            " (east positive) in [sensors]"
-        )
     return rows
 
 
@@ -138,15 +134,12 @@ def _keep_to_one_heading(trials: Iterable[Trial]) -> bool:
 
     Only trials to fit whose velocities are over ground count.
     """
-    headings = []
-    for trial in trials:
-        if trial.over_ground and trial.use == "fit" and "psi" in trial:
-            headings.append(trial["psi"])
-    if not headings:
-        return False
-    directions = np.exp(1j * np.concatenate(headings))
-    concentration = abs(directions.mean())
-    return bool(concentration > 0.85)
+    headings = [
+        trial["psi"]
+        for trial in trials
+        if trial.over_ground and trial.use == "fit" and "psi" in trial
+    ]
+    return bool(headings) and abs(np.exp(1j * np.concatenate(headings)).mean()) > 0.85
 
 
 def currents_of(
@@ -172,23 +165,19 @@ def currents_of(
     """
     found: dict[str, TrialCurrent] = {}
     unknown = []
-    shortest = 5.0 * length / speed
-    for trial in trials:
-        if trial.channels.keys() >= set(CURRENT_COLUMNS):
-            columns = np.array([trial[name] for name in CURRENT_COLUMNS])
-            found[trial.name] = TrialCurrent(columns, None, "columns")
-        elif isinstance(option, Mapping) and trial.over_ground:
-            given = np.array([option["north"], option["east"]], dtype=float)
-            found[trial.name] = TrialCurrent(given, None, "given")
-        elif _shows_current(trial) and trial.duration > shortest:
-            unknown.append(trial)
-    return found | _estimated_currents(unknown, length, speed)
-
-
-def _shows_current(trial: Trial) -> bool:
     needed = {"psi", "u", "v", "r", "delta"}
-    is_true = not trial.magnetic
-    return trial.over_ground and is_true and trial.channels.keys() >= needed
+    for trial in trials:
+        known = trial.channels.keys()
+        if known >= set(CURRENT_COLUMNS):
+            velocity = np.array([trial[name] for name in CURRENT_COLUMNS])
+            found[trial.name] = TrialCurrent(velocity, None, "columns")
+        elif isinstance(option, Mapping) and trial.over_ground:
+            velocity = np.array([option["north"], option["east"]], dtype=float)
+            found[trial.name] = TrialCurrent(velocity, None, "given")
+        elif trial.over_ground and not trial.magnetic and known >= needed:
+            unknown.append(trial)
+    unknown = [trial for trial in unknown if trial.duration > 5.0 * length / speed]
+    return found | _estimated_currents(unknown, length, speed)
 
 
 def _estimated_currents(
@@ -197,7 +186,12 @@ def _estimated_currents(
     fitted = [trial for trial in trials if trial.use == "fit"]
     if not fitted:
         return {}
-    estimate = estimate_current(fitted, length=length, speed=speed, shared=True)
+    estimate = estimate_current(
+        fitted,
+        length=length,
+        speed=speed,
+        shared=True,
+    )
     shared = True
     if len(fitted) > 1:
         each = estimate_current(fitted, length=length, speed=speed, shared=False)
@@ -206,17 +200,15 @@ def _estimated_currents(
 
     found: dict[str, TrialCurrent] = {}
     for trial in trials:
-        own = estimate
-        place = 0
+        own, place = estimate, 0
         if not shared and trial.use == "fit":
-            place = fitted.index(trial)
+            place = 2 * fitted.index(trial)
         elif not shared:
             own = estimate_current([trial], length=length, speed=speed, shared=True)
-        pair = slice(2 * place, 2 * place + 2)
+        pair = slice(place, place + 2)
+        source = "all trials" if shared else "trial"
         found[trial.name] = TrialCurrent(
-            velocity=own.mean[pair],
-            covariance=own.covariance[pair, pair],
-            source="all trials" if shared else "trial",
+            own.mean[pair], own.covariance[pair, pair], source
         )
     return found
 
@@ -227,15 +219,9 @@ def _contradict(currents: Floats, covariance: Floats, chance: float = 1e-6) -> b
     The chance is small because their covariance is an average over few blocks.
     """
     n_others = len(currents) // 2 - 1
-    first = -np.ones((n_others, 1))
-    others = np.eye(n_others)
-    from_first = np.hstack([first, others])
+    from_first = np.hstack([-np.ones((n_others, 1)), np.eye(n_others)])
     apart = np.kron(from_first, np.eye(2))
-
-    differences = apart @ currents
-    of_differences = apart @ covariance @ apart.T
-    probability = wald_probability(differences, of_differences)
-    return probability < chance
+    return wald_probability(apart @ currents, apart @ covariance @ apart.T) < chance
 
 
 def wald_probability(mean: Floats, covariance: Floats) -> float:

@@ -35,29 +35,31 @@ def measured_wind(
         ``relative``: whether speed and direction are those felt on board, the latter
         from the bow.
     """
-    table: dict[str, Any] = {"coefficients": option}
-    if isinstance(option, Mapping):
-        table = dict(option)
-    needed = {"wind_speed", "wind_from", "psi", "u", "v"}
-    if not needed <= trial.channels.keys():
+    table = option if isinstance(option, Mapping) else {"coefficients": option}
+    if not {"wind_speed", "wind_from", "psi", "u", "v"} <= trial.channels.keys():
         return trial
-
     coefficients = table.get("coefficients", "auto")
     if coefficients == "auto":
         coefficients = "blendermann"
     curves = wind_curves(particulars, coefficients)
-    relative = table.get("relative", False)
-    forces = _forces_on(trial, curves, relative)
+    forces = _forces_on(
+        trial,
+        curves,
+        bool(table.get("relative", False)),
+    )
     inertia = particulars_inertia(particulars.completed())[:, :3]
     accelerations = np.linalg.solve(inertia, forces)
-    channels = dict(zip(WIND.values(), accelerations, strict=True))
-    return trial.with_channels(channels)
+    return trial.with_channels(dict(zip(WIND.values(), accelerations, strict=True)))
 
 
 def _forces_on(trial: Trial, curves: WindCurves, relative: bool) -> Floats:
     """X, Y and N by the wind of a trial, shape (3, n_samples)."""
     ahead, aside = _felt_wind(trial, relative)
-    forces = _forces(curves, ahead, aside)
+    forces = _forces(
+        curves,
+        ahead,
+        aside,
+    )
     # her resistance in still air is the model's own
     still_ahead, *_ = curves.X
     u = trial["u"]
@@ -68,13 +70,11 @@ def _forces_on(trial: Trial, curves: WindCurves, relative: bool) -> Floats:
 def _forces(curves: WindCurves, ahead: Floats, aside: Floats) -> Floats:
     """X, Y and N by a wind felt from ahead and starboard, shape (3, n_samples)."""
     angle = np.arctan2(aside, ahead)
-    coefficients = []
-    for row in (curves.X, curves.Y, curves.N):
-        at_angle = np.interp(angle, curves.angle, row, period=2.0 * np.pi)
-        coefficients.append(at_angle)
-    square = ahead**2 + aside**2
-    pressure = 0.5 * AIR_DENSITY * square
-    return pressure * np.array(coefficients)
+    coefficients = [
+        np.interp(angle, curves.angle, row, period=2.0 * np.pi)
+        for row in (curves.X, curves.Y, curves.N)
+    ]
+    return 0.5 * AIR_DENSITY * (ahead**2 + aside**2) * np.array(coefficients)
 
 
 def _felt_wind(trial: Trial, relative: bool) -> tuple[Floats, Floats]:

@@ -186,6 +186,7 @@ def kernel_ship(n_envs: int = 1024, centres: int = 64) -> Row:
     ]
     model = identify(
         trials,
+        structure="linear",
         kernel=KernelResidual(centres=centres, length=1.4, C=100.0),
         particulars=ship.particulars,
         steering=ship.steering,

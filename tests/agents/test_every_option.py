@@ -44,7 +44,7 @@ LINES = (
     ("look ship.toml --out look.html", 0),
     (f"identify ship.toml {LINEAR} --out linear", 0),
     (f"identify ship.toml {GREY} --set kernel=rbf --out grey", 0),
-    (f"advise ship.toml {LINEAR} --criterion c --coefficient N_d --number 1", 0),
+    (f"advise ship.toml {LINEAR} --coefficient N_d --number 1", 0),
     (f"identify ship.toml {WRONG} --out wrong", 2),
     (f"advise ship.toml {WRONG}", 2),
     (

@@ -138,6 +138,16 @@ def put(content, path, is_key, new):
     return content
 
 
+def added(content, path, new):
+    """A copy with an entry more, or another in place of one."""
+    content = json.loads(json.dumps(content))
+    inside = content
+    for key in path[:-1]:
+        inside = inside[key]
+    inside[path[-1]] = new
+    return content
+
+
 def source_of(content):
     """The source that a model comes to; None if the model is refused."""
     try:

@@ -24,7 +24,9 @@ WITH_MEMORY = {
         "frame_stack": 2,
     },
     "held": {"base": LQ_MARINER, "action_repeat": 3},
+    "held without base": {"action_repeat": 2},
     "slow": {"base": LQ_MARINER, "action_repeat": 4, "rate_limit": 0.1},
+    "slow and small": {"base": LQ_MARINER, "authority": 0.05, "rate_limit": 0.05},
 }
 
 
@@ -106,7 +108,7 @@ def test_ships_are_steered_side_by_side_and_alone_by_the_rule(name):
 
 
 @pytest.mark.parametrize(
-    "more", [{}, {"action": "rudder-discrete"}, WITH_MEMORY["stateful base"]], ids=list
+    "more", [{}, {"action": "rudder-discrete"}, *WITH_MEMORY.values()], ids=list
 )
 def test_learned_policies_pass_the_conformance_suite(more):
     policy = random_policy(**more)

@@ -14,7 +14,7 @@ import numpy as np
 
 import shipgym
 from identification import identify
-from identification.pipeline.reading import full_name, identify_arguments
+from identification.pipeline.reading import identify_arguments, read_table
 from tests.golden.store import Floats, numbers_in
 
 ROOT = Path(__file__).parents[2]
@@ -70,15 +70,11 @@ def record_identification(method: str) -> dict[str, Floats]:
     of predictions."""
     ship = shipgym.ShipFile.load(SHIP_FILE)
     options = METHODS[method]
-    kernel = "kernel" in options
-    by_full_name = {
-        full_name(name, "golden", kernel): value for name, value in options.items()
-    }
     result = identify(
         ship.trials(),
         particulars=ship.particulars,
         steering=ship.steering,
-        **identify_arguments(by_full_name),
+        **identify_arguments(read_table(options, "golden")),
     )
     errors = result.standard_errors
     found = {

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from identification import IdentificationResult, identify
+from identification import IdentificationResult
 from identification.samples.checks import check_trials
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
@@ -62,29 +62,3 @@ def test_small_zigzags_and_coarse_ones_move(
 ) -> None:
     run = zigzag(mariner, 5, 1, duration=300, dt=0.1)
     check_trials([record(run, every=every, noise=noise)], mariner.table)
-
-
-def test_orders_at_every_sample_are_no_noise(mariner: ShipModel) -> None:
-    check_trials(
-        [with_rudder(np.random.default_rng(0).choice([-10.0, 10.0], 300))],
-        mariner.table,
-    )
-
-
-@pytest.mark.parametrize("apart", [1e-9, 1e-6, 4e-5])
-def test_times_that_nearly_coincide_are_refused(
-    mariner: ShipModel, noisy_trials: list[Trial], apart: float
-) -> None:
-    run = noisy_trials[0]
-    t = np.insert(run.t, 101, run.t[100] + apart)
-    twice = Trial(
-        t,
-        {c: np.insert(v, 101, v[100]) for c, v in run.channels.items()},
-        name="twice.csv",
-    )
-    message = (
-        r"twice\.csv': expected samples about 1 s apart, got .* remove the repeated"
-        r" row"
-    )
-    with pytest.raises(InputError, match=message):
-        identify([twice], particulars=mariner.particulars)

@@ -102,12 +102,6 @@ def test_trials_of_different_length_and_sampling_are_fitted_together(
             round(d / (0.1 * e)) for _, _, d, e in plan
         )
         assert yaw_error(fit, "15/15") < 0.002
-    by_trial = identify(
-        trials,
-        method=TunedLSSVM(optimiser="grid", folds="trials"),
-        particulars=mariner.particulars,
-    )
-    assert by_trial.stable
 
 
 def test_trials_are_held_out_by_name(
@@ -133,7 +127,6 @@ def test_trials_are_held_out_by_name(
         ("abc-lsvr", "method: .*Did you mean 'abc-lssvr'"),
         (TunedLSSVM(objective="kfold"), "objective: .*Did you mean 'k-fold'"),
         (TunedLSSVM(optimiser="psi"), "optimiser: .*Did you mean 'pso'"),
-        (TunedLSSVM(folds="trials"), "folds: .*2 trials"),
         (LSSVM(C=0.0), "C: "),
         (LSSVM(C=float("nan")), "C: "),
         (LSSVM(kernel="rbf"), "kernel: .*'linear'"),

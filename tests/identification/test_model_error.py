@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from certainty import PARTS, case
@@ -9,6 +11,7 @@ from certainty import PARTS, case
 from identification import IdentificationResult, Samples, Uncertainty, identify
 from identification.estimators.rm_svm import RMSVM
 from identification.judging.closed_loop import closed_loop
+from identification.judging.model_error import with_sound_draws
 from identification.judging.warnings import held_out_error
 from identification.samples.prediction import predict
 from shipgym import ShipModel, Trial
@@ -73,7 +76,7 @@ def test_the_worst_errors_on_trials_held_out_are_said(
     noisy_fit: IdentificationResult,
 ) -> None:
     said = held_out_error(noisy_fit)
-    assert said.startswith("Worst errors on held-out trials: heading ")
+    assert said.startswith("Worst error on held-out trials: heading ")
     assert "(zigzag_15_15)" in said
     overshoot = noisy_fit.metrics["trials"]["zigzag_15_15"]["overshoot_1_deg"]
     assert overshoot["closed_loop"] == pytest.approx(overshoot["measured"], abs=0.5)
@@ -86,27 +89,14 @@ def test_a_correction_left_out_has_an_uncertainty_and_is_said() -> None:
     assert np.all(np.diag(bare.inverse_moment_) > 0.0)
 
 
-def test_a_log_with_positions_tells_of_yaw_what_the_log_without_tells(
-    mariner: ShipModel,
+def test_draws_that_the_log_rejects_are_left_out(
+    noisy_fit: IdentificationResult,
 ) -> None:
-    """Noise of speed and drift, which a structure of yaw does not predict."""
-    rng = np.random.default_rng(0)
-    particulars = {"length": 160.93, "speed": 7.0}
-    with_speed, without = [], []
-    for angle in (10, -10, 20):
-        run = zigzag(mariner, abs(angle), abs(angle), angle < 0, 400.0, 1.0)
-        rate = run["r"] + 1e-4 * rng.standard_normal(len(run))
-        kept = {"psi": run["psi"], "r": rate, "delta": run["delta"]}
-        moving = {q: run[q] + 0.3 * rng.standard_normal(len(run)) for q in "uv"}
-        settings = {"kind": "zigzag", "name": str(angle)}
-        without.append(Trial(run.t, kept, **settings))
-        with_speed.append(Trial(run.t, kept | moving, **settings))
-
-    one, other = (
-        identify(trials, "norrbin", particulars=particulars)
-        for trials in (with_speed, without)
-    )
-    assert one.coefficients == other.coefficients
-    np.testing.assert_allclose(one.model.covariance, other.model.covariance)
-    assert one.model.envelope.to_dict() == other.model.envelope.to_dict()
-    assert one.metrics["trials"]["10"]["rmse"]["u"] is None
+    model = noisy_fit.model
+    trials = [trial for trial in noisy_fit.trials if trial.use == "fit"]
+    assert with_sound_draws(replace(model, draws=None), trials).draws is None
+    wide = replace(model, covariance=9.0 * np.asarray(model.covariance))
+    sound = with_sound_draws(wide, trials)
+    assert 64 <= len(sound.draws) < 128
+    drawn = sound.sample(10, 0)
+    assert all(predict(draw, trials[0]) is not None for draw in drawn)

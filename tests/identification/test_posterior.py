@@ -93,26 +93,11 @@ def test_draws_of_a_posterior_are_sampled_saved_and_of_a_seed(
     np.testing.assert_array_equal(again.draws, model.draws)
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"draws": [[1.0]]}, r"draws\[0\]: expected a list of 2 numbers"),
-        ({"draws": "many"}, r"draws: expected a list"),
-        ({"draws": []}, r"draws of .*: expected at least two rows of 2"),
-        ({"covariance": None}, "draws: expected none without their covariance"),
-    ],
-)
-def test_wrong_draws_in_a_model_file(result, change, message):
-    fields = result.model.to_dict() | change
-    with pytest.raises(InputError, match=message):
-        ShipModel.from_dict(fields)
-
-
 def test_trials_too_few_or_too_alike_are_refused(nomoto, trials):
     with pytest.raises(InputError, match="at least 3 trials to fit for a posterior"):
         identified(nomoto, trials[:2])
     copies = [trials[0].with_(name=f"copy {k}") for k in range(3)]
-    with pytest.raises(InputError, match=r"trials that differ .* got 3 alike"):
+    with pytest.raises(InputError, match=r"which differ in kind.* got 3 alike"):
         identified(nomoto, copies)
 
 
@@ -141,6 +126,5 @@ def test_a_prior_that_trials_contradict_is_named(result, trials):
 def test_a_posterior_is_not_for_a_kernel(nomoto, trials):
     with pytest.raises(InputError, match="expected 'analytic' with a kernel"):
         identify(trials, kernel="rbf", uncertainty="posterior")
-    for settings in ({"steps": 3}, {"seed": -1}):
-        with pytest.raises(InputError, match=r"uncertainty\.(steps|seed): expected"):
-            Uncertainty("posterior", **settings)
+    with pytest.raises(InputError, match=r"uncertainty\.steps: expected"):
+        Uncertainty("posterior", steps=3)

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 from real_ships import Data
-from real_ships.captive import FORCES, combined, held_out, least_squares, read, study
-from real_ships.esso_osaka import LEAST_SPEED, under_way
+from real_ships.captive import FORCES, combined, read, study
 from real_ships.marin import full_scale
 from real_ships.measures import mean_errors, turns, zigzag_errors
 from real_ships.mmg import CIRCLES, HSVA, OTHERS, circle, fitted
 
 from identification import PriorKnowledge
-from shipgym import InputError
 
 SHIPS = Path(__file__).parents[1] / "ships"
 MEASURED_RUNS = Path(__file__).parents[2].parent / "shared" / "data"
@@ -67,14 +64,6 @@ def test_the_mmg_form_of_three_zigzags_predicts_the_others_and_the_circle(
 
 
 @measured
-def test_ships_at_rest_are_cut_off(data: Data) -> None:
-    run = data.ship("esso_osaka_3m", 2).runs["zigzag_31-Jul-2020_13_04_24"]
-    moving = under_way(run)
-    assert run["u"][0] < 0.01
-    assert np.hypot(moving["u"][0], moving["v"][0]) > LEAST_SPEED
-
-
-@measured
 def test_captive_forces_reduce_to_few_terms_that_predict_drift_with_rudder() -> None:
     tests = read(MEASURED_RUNS)
     expected = {"X'": (0.98, 0.90), "Y'": (0.999, 0.998), "N'": (0.999, 0.999)}
@@ -87,19 +76,3 @@ def test_captive_forces_reduce_to_few_terms_that_predict_drift_with_rudder() -> 
     assert (
         yaw["vn"] < 0.0 < yaw["dn"]
     )  # Munk's moment; a rudder to starboard turns to starboard
-
-
-def test_missing_captive_tests_are_told(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot be read"):
-        read(tmp_path)
-
-
-def test_what_is_held_out_is_not_fitted() -> None:
-    """Points on a line but for one far off, which nothing can tell from the others."""
-    x = np.linspace(1.0, 2.0, 10)
-    y = 3.0 * x
-    y[-1] += 5.0
-    folds = [np.array([i]) for i in range(10)]
-    residual = y[-1] - 3.0 * x[-1]
-    score = held_out(x[:, None], y, least_squares, folds)
-    assert (1.0 - score) * np.sum((y - y.mean()) ** 2) > residual**2 * 0.999

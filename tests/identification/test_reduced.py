@@ -63,6 +63,6 @@ def test_a_structure_with_a_memory_of_yaw_is_refused(
     options = {"particulars": mariner.particulars, "structure": "nomoto2"}
     with pytest.raises(
         InputError,
-        match="got 'nomoto2', whose memory of yaw has no regression",
+        match="whose memory of yaw has no regression",
     ):
         identify_reduced(noisy_trials, **options)

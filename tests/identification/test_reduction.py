@@ -11,7 +11,6 @@ from identification.design.reduction import (
     backward_elimination,
 )
 from shipgym import (
-    InputError,
     Particulars,
 )
 
@@ -44,20 +43,3 @@ def test_of_collinear_one_is_dropped() -> None:
 
 
 PARTICULARS = Particulars(length=160.93, speed=7.7175)
-
-
-def test_what_cannot_be_reduced_is_named() -> None:
-    X, y = orthogonal()
-    with pytest.raises(InputError, match="got 20 samples for 8 terms"):
-        backward_elimination(X[:20], y[:20], NAMES)
-    with pytest.raises(InputError, match="expected b to be excited, got 0"):
-        backward_elimination(X * np.array([1.0, 0, 1, 1, 1, 1, 1, 1]), y, NAMES)
-    for wrong in ((np.where(X > 2.0, np.nan, X), y), (X, np.append(y[1:], np.inf))):
-        with pytest.raises(InputError, match="got a value that is not finite"):
-            backward_elimination(*wrong, NAMES)
-    with pytest.raises(InputError, match="expected y to be excited"):
-        backward_elimination(X, 0.0 * y, NAMES)
-    with pytest.raises(InputError, match="one name a term"):
-        backward_elimination(X, y[:-1], NAMES)
-    with pytest.raises(InputError, match="one name a term"):
-        backward_elimination(X, y, NAMES[:3])

@@ -90,21 +90,6 @@ def test_residuals_are_those_of_the_sensors_and_the_provenance_tells(
         noise = {"u": 0.03, "v": 0.03, "r": np.radians(0.01), "psi": np.radians(0.05)}
         assert report["residual_rms"] == pytest.approx(noise, rel=0.1)
         assert report["decision"] == "refined"
-        assert report["cost_after"] < report["cost_before"]
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"segment_lengths": 0.0}, r"segment_lengths: .*got 0"),
-        ({"segment_lengths": 1e100}, r"segment_lengths: .*got 1e\+100"),
-        ({"segment_lengths": 1.05e6}, r"segment_lengths: .*got 1.05e\+06"),
-        ({"pull": -1.0}, "pull: .*got -1"),
-    ],
-)
-def test_wrong_settings_are_refused(settings: dict[str, object], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        Refinement(**settings)  # type: ignore[arg-type]
 
 
 def test_a_memory_of_yaw_cannot_be_refined(

@@ -10,7 +10,6 @@ from dataclasses import replace
 from html import escape
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from identification import (
@@ -23,7 +22,7 @@ from identification.judging.warnings import held_out_error
 from identification.pipeline.result import FILES
 from identification.report.page import report_page
 from shipgym import ShipFile, ShipModel, Trial
-from shipgym.pages import fixed, number
+from shipgym.pages import fixed
 
 ROOT = Path(__file__).parents[2]
 SAVE = """
@@ -102,20 +101,9 @@ def test_figures_by_name(
     truncated: IdentificationResult, searched: IdentificationResult
 ) -> None:
     held = f"prediction: {truncated.trials[-1].name}"
-    common = {"fit", "residuals", "trials", held}
+    common = {"residuals", "trials", held}
     assert plots(truncated).keys() == common | {"l-curve"}
     assert plots(searched).keys() == common
-
-
-def test_a_channel_that_never_moves_is_no_trouble(
-    mariner: ShipModel, cao_zigzag: Trial
-) -> None:
-    """A term of constant shaft speed is 0 throughout; least squares leaves it out."""
-    steady = cao_zigzag.with_channels(
-        {**cao_zigzag.channels, "n": np.full_like(cao_zigzag.t, 1.2)}
-    )
-    result = identify([steady], "surge-perturbed", particulars=mariner.particulars)
-    assert np.all(np.isfinite(list(result.coefficients.values())))
 
 
 def test_the_report_shows_trials_coefficients_and_figures(
@@ -126,13 +114,9 @@ def test_the_report_shows_trials_coefficients_and_figures(
     for name, value in truncated.coefficients.items():
         assert f"<td>{name}</td><td>{fixed(1e5 * value, 1)}</td>" in page
     for trial in truncated.trials:
-        assert trial.name in page
-    figures = (
-        "fit-figure",
-        "residuals-figure",
-        "l-curve-figure",
-    )
-    for figure in (*figures, "fitted-trials", "prediction-0"):
+        assert trial.raw.sha256[:16] in page
+    figures = ("residuals-figure", "l-curve-figure", "fitted-trials", "prediction-0")
+    for figure in figures:
         assert f'id="{figure}"' in page
 
 
@@ -144,30 +128,5 @@ def test_the_report_of_an_unstable_model_shows_no_coefficient(
     page = report_page(lost)
     assert "runs away on 1 of the recorded trials" in page
     assert "It must not be used." in page
-    assert 'id="fit-figure"' in page
+    assert 'id="residuals-figure"' in page
     assert "<td>X_u</td>" not in page
-
-
-def test_the_summary_prints_each_coefficient_with_its_error(
-    truncated: IdentificationResult,
-) -> None:
-    rows = {
-        cells[0]: cells[1:]
-        for line in truncated.summary().splitlines()
-        if len(
-            cells := [cell.strip() for cell in line.replace("┃", "│").split("│")[1:-1]]
-        )
-        in (3, 4)
-    }
-    for name, error in truncated.standard_errors.items():
-        value = truncated.coefficients[name]
-        assert rows[name] == [
-            fixed(1e5 * value, 1),
-            fixed(1e5 * error, 1),
-            fixed(value / error, 1),
-        ]
-    gear = truncated.model.steering
-    assert rows["rudder limit"][0] == f"{number(gear.rudder_limit_deg)} deg"
-    assert rows["rudder rate"] == [f"{number(gear.rudder_rate_deg_s)} deg/s", "given"]
-    added_mass = 1e5 * truncated.model.particulars["Y_vdot"]
-    assert rows["Y_vdot, 10⁻⁵"][0] == fixed(added_mass, 1)

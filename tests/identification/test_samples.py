@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -42,22 +41,6 @@ def test_true_coefficients_satisfy_the_regression(
     assert bound / 100 < mismatch(mariner, samples) < bound
 
 
-def test_irregular_samples_and_windows_satisfy_it_too(
-    mariner: ShipModel, record: Callable[..., Trial]
-) -> None:
-    fine = record(zigzag(mariner, 15, 15, duration=300, dt=0.1), name="fine")
-    rows = np.sort(np.random.default_rng(0).choice(len(fine), 900, replace=False))
-    sparse = Trial(
-        fine.t[rows], {name: values[rows] for name, values in fine.channels.items()}
-    )
-    for window in (1, 7):
-        samples = build_samples(
-            [sparse], mariner.table, mariner.particulars, window=window
-        )
-        assert mismatch(mariner, samples) < 1e-4
-        assert samples.window == window
-
-
 def test_window_follows_the_noise(
     mariner: ShipModel, cao_zigzag: Trial, noisy_trials: list[Trial]
 ) -> None:
@@ -66,24 +49,6 @@ def test_window_follows_the_noise(
     noisy = build_samples(noisy_trials[:1], mariner.table, p)
     assert clean.window == 1
     assert noisy.window == int(p["length"] / p["speed"] / 3.0)  # samples are 1 s apart
-
-
-def test_wrong_arguments_are_named(mariner: ShipModel, cao_zigzag: Trial) -> None:
-    def build(**arguments: object) -> None:
-        build_samples([cao_zigzag], mariner.table, mariner.particulars, **arguments)  # type: ignore[arg-type]
-
-    with pytest.raises(
-        InputError,
-        match=r"samples: .*'euler', 'integral', 'spline'",
-    ):
-        build(samples="cubic")
-    with pytest.raises(InputError, match=r"window: expected .*got 0"):
-        build(window=0)
-    with pytest.raises(
-        InputError,
-        match="'zigzag_15_15': expected more samples than the window of 1001",
-    ):
-        build(window=1001)
 
 
 def without(trial: Trial, *holes: tuple[float, float]) -> Trial:

@@ -7,7 +7,7 @@ import pytest
 
 import shipgym
 from identification import identify
-from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
+from shipgym import Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.ships import structures
 from shipgym.ships.structures import get_structure, list_structures
@@ -156,32 +156,6 @@ def test_a_ship_of_each_structure_is_recovered(name: str) -> None:
     assert f"Coefficients of accelerations, {ship.table.normalisation}" in fit.summary()
 
 
-@pytest.mark.parametrize(
-    ("name", "coefficients"),
-    [
-        ("surge", {"a_u": -1e-3, "a_|u|u": -2e-4, "a_u3": -2e-5, "a_|n|n": 0.02}),
-        ("surge-perturbed", {"a_du": -0.01, "a_du3": -4e-4, "a_dn": 0.05}),
-    ],
-)
-def test_surge_is_recovered_from_accelerations_and_a_crash_stop(
-    name: str, coefficients: dict[str, float]
-) -> None:
-    """Straight runs with the rudder amidships: no rudder has to move."""
-    ship = ship_of(name, coefficients)
-    runs = [(2.0, 1.2), (7.7, 0.6), (1.0, 0.9), (7.7, -0.2)]
-    trials = []
-    for speed, shaft in runs:
-        start = np.array([0.0, 0.0, 0.0, speed, 0.0, 0.0, 0.0])
-        run = ship.simulate(np.tile([0.0, shaft], (1500, 1)), 0.1, start)
-        trials.append(recorded(run, f"{speed} m/s, {shaft} 1/s"))
-    fit = identify(trials, name, particulars=PARTICULARS, service_shaft_speed=N0)
-    for coefficient, value in coefficients.items():
-        assert fit.coefficients[coefficient] == pytest.approx(value, rel=1e-4), (
-            coefficient
-        )
-    assert set(fit.diagnostics) == {"u"}
-
-
 def test_the_container_ship_is_predicted_by_four_terms_as_well_as_zhu_printed() -> None:
     """10/10 predicts 20/20; Zhu 2018 prints 0.0472 m2/s2 of sway, 0.0162 deg2/s2."""
     ship = shipgym.load_model("container")
@@ -215,23 +189,6 @@ def test_a_registered_table_is_identified_by_its_name(
         assert fit.coefficients[coefficient] == pytest.approx(value, rel=1e-4), (
             coefficient
         )
-
-
-def test_a_missing_shaft_speed_is_named() -> None:
-    still = weaves(ship_of("nomoto", own("nomoto")))[0]
-    with pytest.raises(
-        InputError, match=r"weave_10.*channel 'n' is missing, structure 'cubic' needs"
-    ):
-        identify([still], "cubic", particulars=PARTICULARS)
-    stopped = Trial(
-        still.t, {**still.channels, "n": np.zeros(len(still.t))}, name="stopped"
-    )
-    with pytest.raises(
-        InputError, match=r"stopped.*shaft speed.*0 1/s; give service_shaft_speed"
-    ):
-        identify([stopped], "cubic", particulars=PARTICULARS)
-    with pytest.raises(InputError, match=r"service_shaft_speed: expected .*got -1"):
-        identify([stopped], "cubic", particulars=PARTICULARS, service_shaft_speed=-1.0)
 
 
 def test_full_third_order_holds_the_turn_of_an_unstable_ship() -> None:

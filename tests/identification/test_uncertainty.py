@@ -85,18 +85,6 @@ def test_intervals_of_the_derivatives_cover_the_truth_in_95_per_cent(
     assert np.all((deviation > 0.8) & (deviation < 1.2))
 
 
-def test_sway_and_yaw_coefficients_are_correlated_as_their_residuals_are(
-    exact: Samples, mariner: ShipModel
-) -> None:
-    _, scatter, predicted = coverage(exact, mariner, 1, 0.0)
-    names = list(mariner.coefficients)
-    i, j = names.index("Y_v"), names.index("N_v")
-    observed = scatter[i, j] / np.sqrt(scatter[i, i] * scatter[j, j])
-    expected = predicted[i, j] / np.sqrt(predicted[i, i] * predicted[j, j])
-    assert abs(expected) > 0.5
-    assert observed == pytest.approx(expected, abs=0.15)
-
-
 def test_memory_widens_the_intervals_where_errors_last(
     exact: Samples, mariner: ShipModel
 ) -> None:

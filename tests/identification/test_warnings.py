@@ -79,20 +79,10 @@ def test_each_cause_has_its_warning(mariner: ShipModel) -> None:
 
 def test_a_lost_heading_is_told_with_its_trial_and_cause(mariner: ShipModel) -> None:
     (lost,) = model_warnings(fit(given(mariner), heading=np.radians(33.0)))
-    assert "on a.csv (33 deg): likely the model is taken beyond the manoeuvres" in lost
-    assert "by more than 10 deg rms" in lost
+    assert "by more than 10 deg rms on a.csv (33 deg)" in lost
     assert model_warnings(fit(given(mariner), heading=np.radians(10.2)))
     assert not model_warnings(fit(given(mariner), heading=np.radians(9.8)))
     assert not model_warnings(fit(given(mariner), heading=None))  # type: ignore[arg-type]
-    unstable = given(mariner)
-    unstable = replace(
-        unstable,
-        coefficients=unstable.coefficients | {"N_v": 3.0 * mariner.coefficients["N_v"]},
-    )
-    assert (
-        "unstable on a straight course"
-        in model_warnings(fit(unstable, heading=1.0))[-1]
-    )
 
 
 def test_why_a_model_must_not_be_used(mariner: ShipModel) -> None:

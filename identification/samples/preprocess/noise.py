@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.arrays import root_mean_square
-from shipgym.arrays import Floats
 
 #: Noise beyond this part of what a channel changes by from one sample to the next makes
 #: it noisy.
@@ -27,35 +26,21 @@ def noise_level(t: ArrayLike, values: ArrayLike) -> float:
     if n_compared < 1:
         return 0.0
 
-    middle = values[2:-2]
     expected = np.zeros(n_compared)
     gain = np.ones(n_compared)  # of the variance of a difference by that of a sample
+    times = [t[j : j + n_compared] for j in range(5)]
     for i in NEIGHBOURS:
-        neighbour = values[i : i + n_compared]
-        weight = _lagrange_weight(t, i)
-        expected += weight * neighbour
+        # Lagrange's polynomial of the i-th of five samples in the middle one
+        weight = np.ones(n_compared)
+        for j in NEIGHBOURS:
+            if j != i:
+                weight *= (times[2] - times[j]) / (times[i] - times[j])
+        expected += weight * values[i : i + n_compared]
         gain += weight**2
 
-    deviations = middle - expected
-    scaled = deviations / np.sqrt(gain)
-    median = np.median(np.abs(scaled))
+    scaled = np.abs(values[2:-2] - expected) / np.sqrt(gain)
     quartile_of_normal = 0.6745
-    return float(median / quartile_of_normal)
-
-
-def _lagrange_weight(t: Floats, i: int) -> Floats:
-    """Lagrange's polynomial of the i-th of five samples in the middle one.
-
-    Of all fives of samples in a row, shape (n_samples - 4,).
-    """
-    n_fives = len(t) - 4
-    times = [t[j : j + n_fives] for j in range(5)]
-    middle = times[2]
-    weight = np.ones(n_fives)
-    for j in NEIGHBOURS:
-        if j != i:
-            weight *= (middle - times[j]) / (times[i] - times[j])
-    return weight
+    return float(np.median(scaled) / quartile_of_normal)
 
 
 def noise_ratio(t: ArrayLike, values: ArrayLike, window: int = 1) -> float:

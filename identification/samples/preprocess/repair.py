@@ -36,7 +36,11 @@ def outliers(t: ArrayLike, values: ArrayLike, may_step: bool = True) -> Flags:
     if len(values) < WIDTH:
         return np.zeros(len(values), dtype=bool)
 
-    middle = median_filter(values, WIDTH, mode="nearest")
+    middle = median_filter(
+        values,
+        WIDTH,
+        mode="nearest",
+    )
     rounding = 1e-9 * np.ptp(middle)
     least = OUTLYING * noise_level(t, values) + rounding
     allowed = least + 0.5 * WIDTH * _usual_steps(middle)
@@ -69,18 +73,13 @@ def _ends_that_jump(
     A jump is further than the signal moves anywhere inside.
     """
     half = WIDTH // 2
-    inside = middle[half:-half]
-    largest_move = np.abs(np.diff(inside)).max()
+    largest_move = np.abs(np.diff(middle[half:-half])).max()
     steps = np.diff(t)
-    jumps = np.abs(np.diff(values))
-
-    def is_jump(end: int) -> bool:
-        # next to a gap the signal moves further
-        longer = max(steps[end] / np.median(steps), 1.0)
-        largest = (least + WIDTH * largest_move) * longer
-        return bool(jumps[end] > largest)
-
-    return is_jump(0), is_jump(-1)
+    # next to a gap the signal moves further
+    longer = np.maximum(steps[[0, -1]] / np.median(steps), 1.0)
+    jumps = np.abs(np.diff(values))[[0, -1]]
+    first, last = jumps > (least + WIDTH * largest_move) * longer
+    return bool(first), bool(last)
 
 
 def repaired(trial: Trial) -> Trial:
@@ -103,21 +102,19 @@ def repaired(trial: Trial) -> Trial:
         if sound.all():
             continue
 
-        good = values[~wrong]
-        filled = _interpolated(times, trial.t[~wrong], good)
+        # beyond the good values the first or the last
+        known, good = trial.t[~wrong], values[~wrong]
+        filled = PchipInterpolator(known, good)(np.clip(times, known[0], known[-1]))
         filled[sound] = good  # to the bit as they were
         channels[name] = filled
         counts[name] = int((~sound).sum())
     if not counts:
         return trial
-    return trial.with_channels(channels, t=times, repaired=counts)
-
-
-def _interpolated(times: Floats, known: Floats, values: Floats) -> Floats:
-    """PCHIP through values at known times; beyond these the first or the last."""
-    curve = PchipInterpolator(known, values)
-    within = np.clip(times, known[0], known[-1])
-    return np.asarray(curve(within))
+    return trial.with_channels(
+        channels,
+        t=times,
+        repaired=counts,
+    )
 
 
 def _outliers_of(trial: Trial, name: str) -> Flags:
@@ -126,7 +123,11 @@ def _outliers_of(trial: Trial, name: str) -> Flags:
     if name not in measured:
         return np.zeros(len(trial), dtype=bool)
     stepping = ("delta", "n")  # without the inertia of a ship
-    wrong = outliers(trial.t, trial[name], may_step=name in stepping)
+    wrong = outliers(
+        trial.t,
+        trial[name],
+        may_step=name in stepping,
+    )
     if wrong.mean() > 0.1:
         raise InputError(
             f"trial {trial.name!r}: expected at most a tenth of {name} to be outliers,"
@@ -141,11 +142,13 @@ def _filled_times(t: Floats) -> Floats:
     usual = usual_step(t)
     times = [t]
     for start, end in pairwise(t):
-        step = end - start
-        if 1.5 * usual < step <= 10.5 * usual:
-            n_steps = round(step / usual)
-            filled = np.linspace(start, end, n_steps + 1)
-            missing = filled[1:-1]
-            times.append(missing)
-    every_time = np.concatenate(times)
-    return np.unique(every_time)
+        if 1.5 * usual < end - start <= 10.5 * usual:
+            n_steps = round((end - start) / usual)
+            times.append(
+                np.linspace(
+                    start,
+                    end,
+                    n_steps + 1,
+                )[1:-1]
+            )
+    return np.unique(np.concatenate(times))
