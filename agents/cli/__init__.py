@@ -117,7 +117,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
     "new-ship": (new_ship_command, "zigzag.csv circle.csv --length 160.9"),
     "look": (look_command, "ship.toml --out look.html"),
     "identify": (identify_command, "ship.toml --structure abkowitz --out my_ship/"),
-    "advise": (advise_command, "ship.toml --criterion c --number 2"),
+    "advise": (advise_command, "ship.toml --number 2"),
     "reduce": (reduce_command, "ship.toml --tolerance 1e-4 --out my_ship/"),
     "trials": (trials_command, "my_ship/model.json --out trials.html"),
     "autopilot": (autopilot_command, "ship.toml --draws 200 --out report/"),
