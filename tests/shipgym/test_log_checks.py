@@ -82,38 +82,12 @@ def test_what_no_ship_does_is_refused_with_a_remedy(tmp_path, columns, message):
     assert message in refusal(written(tmp_path / "run.csv", **{"t": T, **columns}))
 
 
-@pytest.mark.parametrize(
-    "columns",
-    [
-        {"u": at(U, 3, 50.0)},
-        {"psi": at(SWING, 99, SWING[99] + 0.5)},  # an outlier of less than 30 deg
-        {"psi": SWING, "r": RATE / 4.7},
-        {"psi": SWING, "r": RATE + 0.001},  # a bias
-        {"psi": TURN, "x": X, "y": Y, "u": 0.57 * U, "v": V},
-        {"psi": TURN, "sog": U, "cog": TURN + 0.9},  # all of it may be drift
-        {"psi": SWING, "sog": U, "cog": SWING - 0.6 * np.cos(0.05 * T)},
-    ],
-)
-def test_what_a_ship_may_do_is_read(tmp_path, columns):
-    assert len(Trial.from_csv(written(tmp_path / "run.csv", t=T, **columns))) == T.size
-
-
 def test_an_outlier_of_the_heading_or_position_is_filled_and_counted(tmp_path):
     columns = {"lat": at(57 + 5e-5 * T, 9, 58.0), "lon": 11 + V, "psi": at(V, 30, 1.0)}
     path = written(tmp_path / "run.csv", t=T, **columns)
     trial = Trial.from_csv(path, repair="interpolate")
     assert trial.repaired == {"x": 1, "y": 1, "psi": 1}
     np.testing.assert_allclose(np.diff(trial["x"]), 5.57, atol=0.01)
-
-
-@pytest.mark.parametrize(
-    ("step", "unit"), [(0.01, None), (10.0, None), (11.0, "ms"), (0.004, "min")]
-)
-def test_rows_unusually_far_apart_or_close_doubt_the_unit_of_time(tmp_path, step, unit):
-    path = written(tmp_path / "run.csv", t=step * T, psi=1e-4 * T)
-    notes = Trial.from_csv(path).notes
-    doubts = [one for one in notes if "unit of time" in one]
-    assert [f'unit = "{unit}"' in one for one in doubts] == [True] * (unit is not None)
 
 
 # --- conventions
@@ -242,29 +216,6 @@ def test_a_cut_that_holds_no_trial_is_refused(tmp_path, cut, t, message):
 
 
 # --- what is missing
-
-
-@pytest.mark.parametrize(
-    ("rows", "step", "is_refused"),
-    [(19, 1.0, False), (20, 1.0, True), (10, 9.0, False), (11, 9.0, True)],
-)
-def test_a_hole_is_too_long_with_more_than_ten_rows_over_more_than_twenty_steps(
-    rows, step, is_refused, tmp_path
-):
-    """Of 200 rows, 1 s apart but in the hole."""
-    steps = np.ones(199)
-    steps[99 : 100 + rows] = step
-    t = np.r_[0.0, np.cumsum(steps)]
-    psi = 0.001 * t
-    psi[100 : 100 + rows] = np.nan
-    path = written(tmp_path / "run.csv", t=t, psi=psi)
-    if is_refused:
-        found = refusal(path, repair="interpolate")
-        assert f"{rows} rows without a value, over {step * (rows + 1):g} s" in found
-        return
-    trial = Trial.from_csv(path, repair="interpolate")
-    np.testing.assert_allclose(trial["psi"], 0.001 * t, atol=1e-9)
-    assert trial.repaired == {"psi": rows}
 
 
 @pytest.mark.parametrize(("unit", "turn"), [("deg", 360.0), ("rad", 2.0 * math.pi)])

@@ -112,14 +112,6 @@ def test_what_is_odd_is_counted_and_left_out(tmp_path, kind):
     assert note in " ".join(guess.trial.notes)
 
 
-def test_many_rows_without_a_time_are_refused_with_the_first_of_them(tmp_path):
-    columns = plain(Time=[one.t if one.t % 5 else "" for one in SHIP])
-    columns["Time [s]"] = columns.pop("Time")
-    (decision,) = guessed(tmp_path, table(columns, *columns.values())).decisions
-    assert "line 2 (data row 1)" in decision.choices
-    assert "time cannot be interpolated" in decision.choices
-
-
 def test_rows_without_their_last_cells_are_completed(tmp_path):
     text = "Time,Heading,Rudder,Depth,Note\n"
     for one in SHIP:
@@ -127,14 +119,6 @@ def test_rows_without_their_last_cells_are_completed(tmp_path):
     guess = guessed(tmp_path, text)
     assert turned(guess.trial) < 0.3
     assert "lack cells at their end" in " ".join(guess.trial.notes)
-
-
-def test_of_two_columns_of_one_name_the_stuck_one_is_left_out(tmp_path):
-    columns = plain()
-    names = ["Time", "Heading", "Heading", "Rudder"]
-    text = table(names, columns["Time"], 0.0 * T, columns["Heading"], columns["Rudder"])
-    guess = guessed(tmp_path, text)
-    assert turned(guess.trial) < 0.3
 
 
 @pytest.mark.parametrize(
@@ -217,26 +201,6 @@ def test_a_parquet_file_that_unpacks_to_too_much_is_refused(tmp_path, monkeypatc
     monkeypatch.setattr("shipgym.trials.readers.text_files.LARGEST_UNPACKED", 2**20)
     with pytest.raises(InputError, match="at most 1048576 bytes unpacked"):
         guess_trial(tmp_path / "log.parquet")
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_side_of_a_rudder_order_is_told_where_no_rudder_was_measured(
-    tmp_path, sign
-):
-    columns = plain()
-    order = [sign * one.rudder for one in SHIP]
-    text = table(["Time", "Heading", "Rudder Order"], T, columns["Heading"], order)
-    guess = guessed(tmp_path, text)
-    assert guess.side.side == ("starboard" if sign > 0.0 else "port")
-
-
-def test_names_of_parts_are_known(tmp_path):
-    names = ["RecTime", "GYRO HDG", "rud_fb", "POS N", "POS E"]
-    columns = plain()
-    positions = [[one.lat for one in SHIP], [one.lon for one in SHIP]]
-    text = table(names, T, columns["Heading"], columns["Rudder"], *positions)
-    found = [one.channel for one in guessed(tmp_path, text).columns]
-    assert sorted(found) == ["delta", "lat", "lon", "psi", "t"]
 
 
 def test_of_two_files_with_a_column_the_named_one_is_read(tmp_path):

@@ -137,16 +137,6 @@ def test_a_ship_file_gives_particulars_steering_gear_and_defaults(folder):
     assert ship.identify == {"structure": "abkowitz", "method": "tls-svm"}
 
 
-def test_wind_has_a_table_of_its_own(folder):
-    path = folder / "ship.toml"
-    path.write_text(
-        path.read_text().replace(
-            "[[trials]]", "[wind]\nrelative = true\n\n[[trials]]", 1
-        )
-    )
-    assert ShipFile.load(path).identify["wind"] == {"relative": True}
-
-
 def test_trials_are_read_with_the_file_s_conventions_or_their_own(folder):
     a, b = ShipFile.load(folder / "ship.toml").trials()
     assert (a.name, a.kind, a.use) == ("a.csv", "zigzag", "fit")

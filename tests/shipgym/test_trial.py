@@ -140,18 +140,6 @@ def test_a_trial_survives_a_pickle_immutable():
 # --- CSV: what comes in
 
 
-def test_a_file_with_the_project_s_names_needs_no_further_words(tmp_path):
-    channels = manoeuvre()
-    trial = Trial.from_csv(
-        write(tmp_path / "run.csv", {"t": T, **channels, "thrust": T})
-    )
-    assert trial.name == "run.csv"
-    assert trial.derived == frozenset()
-    assert set(trial.channels) == set(channels)
-    for name, values in channels.items():
-        np.testing.assert_array_equal(trial[name], values)
-
-
 @settings(
     max_examples=25,
     deadline=None,
