@@ -77,7 +77,11 @@ def read_clock(texts: Sequence[str]) -> Floats:
     return seconds
 
 
-def _moments(series: Any, first: str, day_first: bool) -> Any:
+def _moments(
+    series: Any,
+    first: str,
+    day_first: bool,
+) -> Any:
     """Moments of texts, by the form of the first one where they have it."""
     import pandas as pd
 

@@ -32,7 +32,11 @@ def check_cut(cut: Any, where: str) -> None:
         raise InputError(f"{where} cut: {_EXPECTED}, got {shown(cut)}")
 
 
-def cut_log(cut: Any, log: Log, where: str) -> list[slice]:
+def cut_log(
+    cut: Any,
+    log: Log,
+    where: str,
+) -> list[slice]:
     """Samples of each part, in order of time.
 
     Raises InputError for a part without samples, and for clock times of a log without a

@@ -91,7 +91,10 @@ def _cg_to_midship(log: Log, xg: float) -> None:
     channels |= moved
 
 
-def _to_midship(log: Log, installation: Installation) -> None:
+def _to_midship(
+    log: Log,
+    installation: Installation,
+) -> None:
     """Move GNSS positions and velocities to midship and derive surge and sway.
 
     Velocity over ground gives u and v, else positions; a speed through the water takes

@@ -173,7 +173,11 @@ def _signals(
     return signals, locator, filled
 
 
-def _own_signals(t: Floats, channels: dict[str, Floats], locator: Locator) -> Signals:
+def _own_signals(
+    t: Floats,
+    channels: dict[str, Floats],
+    locator: Locator,
+) -> Signals:
     check_ranges({"t": t, **channels}, locator)
     signals = {}
     for name, values in channels.items():

@@ -21,10 +21,7 @@ _EPOCHS = {
     "unix us": 0.0,
     "unix ns": 0.0,
     "excel days": -25_569.0 * DAY,
-    "excel days 1904": -24_107.0 * DAY,
     "matlab days": -719_529.0 * DAY,
-    # 1980-01-06, less the leap seconds since 2017
-    "gps s": 315_964_782.0,
 }
 _STAMP = re.compile(r"(\d{9,10})\.(\d{1,9})")
 _COMPACT = re.compile(
@@ -68,7 +65,7 @@ def read_times(table: LogTable, column: Column) -> RowTimes:
         clock = si_factor("t", column.unit) * table.numbers(column.name)
         if column.nanoseconds is not None:
             clock += 1e-9 * table.numbers(column.nanoseconds)
-        if column.unit.endswith(("days", "1904")):
+        if column.unit.endswith("days"):
             clock = np.round(clock, 3)  # days have some nine decimals
         clock += _EPOCHS.get(column.unit, 0.0)
     clock = _one_after_another(_spread(clock, notes), table, column, notes)

@@ -38,7 +38,11 @@ def _largest(values: Floats) -> float:
     return float(np.quantile(np.abs(values), 0.95))
 
 
-def _check_speed(fastest: float, ship: Particulars, where: str) -> None:
+def _check_speed(
+    fastest: float,
+    ship: Particulars,
+    where: str,
+) -> None:
     service_speed = ship.speed
     if service_speed is None or "speed" in ship.estimated:
         return

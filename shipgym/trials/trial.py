@@ -398,7 +398,10 @@ def cut_trials(cut: Any, log: Log, name: str, where: str, **facts: Any) -> list[
     ]
 
 
-def _check_time(t: Floats, where: str) -> None:
+def _check_time(
+    t: Floats,
+    where: str,
+) -> None:
     if t.size < FEWEST_SAMPLES:
         raise InputError(
             f"{where}: expected at least {FEWEST_SAMPLES} samples, got {t.size}"

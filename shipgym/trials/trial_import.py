@@ -174,7 +174,10 @@ def _check_channels(
     return remarks
 
 
-def _complete(log: Log, recordings: Sequence[Recording]) -> None:
+def _complete(
+    log: Log,
+    recordings: Sequence[Recording],
+) -> None:
     """Order the channels, and add the clock and the counts of values filled in."""
     log.channels = {
         name: log.channels[name] for name in QUANTITIES if name in log.channels

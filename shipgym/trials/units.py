@@ -83,7 +83,9 @@ class NameEnd(NamedTuple):
     units: list[str]  # that are spelled like its end, the longest first
 
 
-def split_unit(name: str) -> NameEnd:
+def split_unit(
+    name: str,
+) -> NameEnd:
     """Part a column's name from the unit with which it ends.
 
     The name is in lower case, with blanks for underscores.

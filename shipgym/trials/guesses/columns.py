@@ -292,7 +292,11 @@ def _may_be(table: LogTable, column: str, channel: str) -> bool:
     return not (channel in ("sog", "stw", "wind_speed") and goes_back)
 
 
-def _is_duration(table: LogTable, column: str, unit: UnitGuess) -> bool:
+def _is_duration(
+    table: LogTable,
+    column: str,
+    unit: UnitGuess,
+) -> bool:
     """Return whether times may be in the unit of their name, and do not need another.
 
     Seconds of 1.7e9 count from 1970.

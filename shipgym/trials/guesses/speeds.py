@@ -78,7 +78,11 @@ def _speed_by_positions(
     return None
 
 
-def _by_positions(guess: ColumnGuess, number: float, known: float) -> ColumnGuess:
+def _by_positions(
+    guess: ColumnGuess,
+    number: float,
+    known: float,
+) -> ColumnGuess:
     """The guess with the unit in which its usual number agrees best with a speed."""
     if not known > 0.0 or not number > 0.0:
         return guess

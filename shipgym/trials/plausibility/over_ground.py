@@ -119,19 +119,13 @@ def _heading_fault(psi: Floats, course: Floats, *, offset_is_known: bool) -> str
 def _constant_offset(psi: Floats, drift: Floats) -> float | None:
     """Part of the heading's difference from the course that does not turn, rad.
 
-    A ship drifts outwards in a turn, and an antenna aft of midship more so: what goes
-    with the rate of turning is no error of the heading. None where she turns all the
-    time to one side, so that nobody can tell. `drift` is the course over ground less
-    the heading, without jumps.
+    A ship drifts outwards in a turn, and an antenna aft of midship more so: what she
+    shows on straight parts is the heading's. None where she turns all the time. `drift`
+    is the course over ground less the heading, without jumps.
     """
-    turning = np.gradient(psi)
-    fastest = np.quantile(np.abs(turning), 0.95)
-    is_straight = np.abs(turning) <= 0.2 * fastest
-    if fastest == 0.0 or is_straight.mean() > 0.1:
-        return -float(np.median(drift[is_straight]))
-    to_starboard = np.mean(turning > 0.2 * fastest)
-    to_port = np.mean(turning < -0.2 * fastest)
-    if min(to_starboard, to_port) <= 0.1:
+    turning = np.abs(np.gradient(psi))
+    fastest = np.quantile(turning, 0.95)
+    is_straight = turning <= 0.2 * fastest
+    if is_straight.mean() <= 0.1:
         return None
-    _, offset = np.polyfit(turning, drift, deg=1)
-    return -float(offset)
+    return -float(np.median(drift[is_straight]))

@@ -23,7 +23,9 @@ _WITH_SIDE = [
 ]
 
 
-def is_missing(text: str) -> bool:
+def is_missing(
+    text: str,
+) -> bool:
     """Return whether a cell stands for "no value": blank, signs alone, or a word."""
     bare = text.strip()
     if bare[-1:].isdigit():

@@ -108,7 +108,10 @@ class LogTable:
         """Cells of a column as texts with decimal points, empty without a value."""
         return [self._text(cell) for cell in self.column(name).tolist()]
 
-    def _text(self, cell: Any) -> str:
+    def _text(
+        self,
+        cell: Any,
+    ) -> str:
         text = str(cell).strip()
         if self.decimal_comma and "." not in text:
             text = text.replace(",", ".")

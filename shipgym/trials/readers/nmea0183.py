@@ -141,7 +141,10 @@ def hear_sentences(lines: Sequence[str], heard: Heard) -> None:
         )
 
 
-def _find(lines: Sequence[str], heard: Heard) -> list[_Found]:
+def _find(
+    lines: Sequence[str],
+    heard: Heard,
+) -> list[_Found]:
     """Sentences of known kinds; the stamps of their lines are heard."""
     found = []
     for number, line in enumerate(lines, start=1):

@@ -176,7 +176,9 @@ def _number(text: Any) -> float | None:
     return number if np.isfinite(number) else None
 
 
-def _angle_unit(messages: Iterable[_Message]) -> str:
+def _angle_unit(
+    messages: Iterable[_Message],
+) -> str:
     """Unit of angles without one: rad where headings and courses are that small."""
     without_unit = [
         _number(value) or 0.0
