@@ -15,6 +15,6 @@ if (
 ):
     del sys.path[0]
 
-import lazy_loader
+from shipgym.extras import public_names
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = public_names(__name__, __file__)

@@ -154,6 +154,8 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")
     os.environ["PYTHONSAFEPATH"] = "1"  # for processes that libraries start
     warnings.showwarning = _show_warning  # names in it come from files
+    # joblib's, of a job that ended with an error, which is said anyway
+    warnings.filterwarnings("ignore", "A worker stopped while some jobs")
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # clean up as on Ctrl-C
     try:
         app(prog_name="shipgym")

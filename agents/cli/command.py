@@ -5,7 +5,6 @@ import inspect
 import os
 import sys
 from collections.abc import Callable
-from difflib import get_close_matches
 from errno import EBADF, ENOSPC, EPIPE
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -131,12 +130,13 @@ class CommandGroup(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Refuse an unknown command, with the nearest that exists."""
+        from shipgym.checks import did_you_mean
+
         name = args[0]
         if name not in self.commands:
-            near = get_close_matches(name, self.commands) or self.commands
-            ctx.fail(
-                f"No such command '{name}'. Did you mean one of {', '.join(near)}?"
-            )
+            near = did_you_mean(name, self.commands)
+            known = ", ".join(self.commands)
+            ctx.fail(f"No such command '{name}'.{near} Commands: {known}")
         return super().resolve_command(ctx, args)
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:

@@ -78,4 +78,4 @@ def plotted(plot: Figure) -> dict[str, Any]:
 
 def sentence(text: str) -> str:
     """A text with a capital at its beginning and a full stop at its end."""
-    return f"{text[:1].upper()}{text[1:]}."
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}."

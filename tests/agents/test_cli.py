@@ -5,6 +5,7 @@ import json
 import re
 import resource
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,10 +15,19 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+import agents
+import identification
+from agents import PID
 from agents.cli import app
 from agents.cli.command import CommandGroup, shared_options
 from agents.jobs import JobError
-from shipgym import InputError, ManoeuvreError, UnstableModelError, load_model
+from shipgym import (
+    InputError,
+    ManoeuvreError,
+    UnstableModelError,
+    example_ship,
+    load_model,
+)
 
 ROOT = Path(__file__).parents[2]
 
@@ -102,11 +112,8 @@ def test_wrong_usage_exits_with_2_and_says_why(command):
 @pytest.mark.parametrize(
     ("words", "near"),
     [
-        (["identfy"], "Did you mean one of identify?"),
-        (
-            ["steer", "lq.json"],
-            "No such command 'steer'. Did you mean one of new-ship,",
-        ),
+        (["identfy"], "Did you mean 'identify'?"),
+        (["steer", "lq.json"], "No such command 'steer'. Commands: new-ship,"),
         (["export", "x", "--fmi", "2.0"], "No such option: --fmi"),
         (["export", "x", "--fmi", "2.0"], "--fmu"),
     ],
@@ -232,6 +239,46 @@ def test_what_trials_cannot_use_exits_with_2(words, message, tmp_path, monkeypat
     answer = shipgym("trials", *words)
     assert answer.exit_code == 2
     assert message in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "found", "command"),
+    [
+        ("identify zigzag_15_15.csv --out out", "log", "new-ship"),
+        ("autopilot model.json --out out", "model file", "trials"),
+        ("trials ship.toml", "ship file", "look, identify"),
+        ("trials pid.json", "controller file", "export"),
+        ("export zigzag_15_15.csv --c c", "log", "new-ship"),
+        ("autopilot ship.toml --agent model.json --out out", "model file", "trials"),
+        ("replay pid.json --out out.html", "controller file", "export"),
+        ("benchmark --controllers own.py --out out", "Python file", "benchmark"),
+        ("trials .", "folder", None),
+    ],
+)
+def test_a_file_of_another_kind_is_named_with_the_command_for_it(
+    words, found, command, demo, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(example_ship().parent, tmp_path, dirs_exist_ok=True)
+    ship = load_model("mariner")
+    ship.save("model.json")
+    PID.from_model(ship).save("pid.json")
+    Path("own.py").write_text("def helper(x):\n    return x\n")
+    answer = shipgym(*words.split())
+    assert answer.exit_code == 2
+    given = f", got a {found}; give " + ("it to shipgym " if command else "model.json")
+    assert given + (command or "") in answer.stderr
+    assert answer.stderr.count("error: ") == 1
+
+
+def test_an_unknown_name_is_refused_with_the_nearest_and_that_of_papers():
+    for package, name, near in (
+        (identification, "TLS_SVM", "TruncatedLSSVM"),
+        (identification, "ABC_LSSVR", "ArtificialBeeColony"),
+        (agents, "LQR", "LQ"),
+    ):
+        with pytest.raises(AttributeError, match=f"Did you mean '{near}'"):
+            getattr(package, name)
 
 
 def failing_command(error):
