@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from html import escape
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from identification.judging.fit import Fit
-from identification.pipeline.summary import summary_table
+from identification.pipeline.summary import result_card, summary_table
 from shipgym import InputError
 from shipgym.drafts import draft_folder
 from shipgym.files import write_json
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 #: Files of a saved result; the last one is that of `write_report`.
 FILES = ("model.json", "metrics.json", "settings.json", "report.html")
@@ -24,6 +29,36 @@ class IdentificationResult(Fit):
         inertia that was not given is marked as estimated.
         """
         return summary_table(self)
+
+    def __repr__(self) -> str:
+        """Return a card of a few lines: the verdict, errors and coefficients."""
+        return result_card(self)
+
+    def _repr_html_(self) -> str:
+        """Return the card and a table of the coefficients, for a notebook."""
+        table: str = self.to_frame().to_html(float_format="%.4g")
+        return f"<pre>{escape(result_card(self))}</pre>{table}"
+
+    def to_frame(self) -> DataFrame:
+        """Return a row for each coefficient: value, standard error and t."""
+        from pandas import DataFrame
+
+        value = list(self.coefficients.values())
+        names = list(self.coefficients)
+        error = [self.standard_errors.get(name) for name in names]
+        columns = {"value": value, "standard_error": error}
+        frame = DataFrame(columns, index=names, dtype=float)
+        frame["t"] = frame["value"] / frame["standard_error"]
+        return frame
+
+    def trials_frame(self) -> DataFrame:
+        """Return a row for each trial: its use and the errors of its simulation, SI."""
+        from pandas import DataFrame
+
+        rows = {}
+        for name, metrics in self.metrics["trials"].items():
+            rows[name] = {"use": metrics["use"], **metrics["rmse"]}
+        return DataFrame.from_dict(rows, orient="index")
 
     def save(self, folder: str | Path) -> None:
         """Write model.json, metrics.json and settings.json, all or none.

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from identification.judging.fit import Fit
 from identification.judging.sentences import error_source, findings
-from identification.judging.warnings import inseparable
+from identification.judging.warnings import held_out_error, inseparable
 from identification.text import as_text, lined_table
 from shipgym import ShipModel
 from shipgym.pages.numbers import MINUS, NONE, fixed, number
@@ -62,6 +62,23 @@ def summary_table(fit: Fit) -> str:
         *inseparable(fit),
     ]
     return as_text(*shown)
+
+
+def result_card(fit: Fit) -> str:
+    """The result in a few lines: verdict, held-out error, coefficients, what next."""
+    trials = fit.metrics["trials"].values()
+    uses = [one["use"] for one in trials]
+    rows = sorted(coefficient_rows(fit), key=lambda row: not row.significant)
+    shown = ", ".join(f"{row.name} {row.value} ± {row.error}" for row in rows[:4])
+    significant = sum(row.significant for row in rows)
+    lines = [
+        f"{fit.model.name}: {how_identified(fit)}; {_verdict(fit)}",
+        f"trials: {uses.count('fit')} fitted, {uses.count('validate')} held out",
+        held_out_error(fit),
+        f"{len(rows)} coefficients, {significant} differ from zero: {shown}, ...",
+        "more: summary(), to_frame(), trials_frame(), model, metrics, save(folder)",
+    ]
+    return "\n".join(lines)
 
 
 def how_identified(fit: Fit) -> str:

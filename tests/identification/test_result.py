@@ -130,3 +130,14 @@ def test_the_report_of_an_unstable_model_shows_no_coefficient(
     assert "It must not be used." in page
     assert 'id="residuals-figure"' in page
     assert "<td>X_u</td>" not in page
+
+
+def test_a_notebook_shows_a_card_and_frames(truncated: IdentificationResult) -> None:
+    card = repr(truncated)
+    assert len(card.splitlines()) <= 10
+    assert held_out_error(truncated) in card
+    frame = truncated.to_frame()
+    assert frame["value"].to_dict() == truncated.coefficients
+    assert "<td>" in truncated._repr_html_()
+    uses = [trial.use for trial in truncated.trials]
+    assert truncated.trials_frame()["use"].tolist() == uses
