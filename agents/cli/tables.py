@@ -32,6 +32,7 @@ def plain_table(title: str, *headings: str) -> Table:
             heading.removeprefix(">"),
             justify="right" if heading.startswith(">") else "left",
             no_wrap=column == 0,
+            overflow="fold",
         )
     return table
 

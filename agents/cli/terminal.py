@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -47,8 +48,9 @@ class PlainConsole(Console):
                 yield segment._replace(text=segment.text.translate(controls))
 
 
+MINUTE = 60.0  # s
 AS_JSON: ContextVar[bool] = ContextVar("as_json", default=False)
-console = PlainConsole(width=None if sys.stdout.isatty() else 110)
+console = PlainConsole(width=None if sys.stdout.isatty() else 160)
 err = PlainConsole(stderr=True)
 
 
@@ -116,10 +118,14 @@ def progress_bars() -> Iterator[Progress | None]:
     """Bars on standard error, one for each stage, with the remaining time.
 
     Yields a function that is called with the stage, the units done and their total, 0
-    where that is unknown; None where no bar is shown, as with `--json` and `--quiet`.
+    where that is unknown; None where nothing is shown, as with `--json` and `--quiet`.
+    Off a terminal a line a minute says how far the work is.
     """
-    if console.quiet or not err.is_terminal:
+    if console.quiet:
         yield None
+        return
+    if not err.is_terminal:
+        yield _line_a_minute()
         return
     with _bars("task.description:<30") as bars:
         tasks: dict[str, Any] = {}
@@ -130,6 +136,20 @@ def progress_bars() -> Iterator[Progress | None]:
             bars.update(tasks[stage], completed=done, total=total or None)
 
         yield on_progress
+
+
+def _line_a_minute() -> Progress:
+    """Progress in lines, the first after a minute."""
+    told = monotonic()
+
+    def on_progress(stage: str, done: int, total: int) -> None:
+        nonlocal told
+        if monotonic() - told >= MINUTE:
+            told = monotonic()
+            share = f": {done} of {total}" if total else ""
+            err.print(f"{stage}{share}", soft_wrap=True)
+
+    return on_progress
 
 
 @contextmanager

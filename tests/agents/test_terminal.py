@@ -40,6 +40,23 @@ def test_bars_are_shown_on_a_terminal_that_is_not_to_be_quiet(quiet, monkeypatch
         assert last["training"].rstrip().endswith("cost 5, best 4.5, LQ 4.25")
 
 
+def test_off_a_terminal_a_line_a_minute_is_printed(monkeypatch, capsys):
+    seconds = iter(range(0, 10_000, 40))
+    monkeypatch.setattr(terminal, "monotonic", lambda: next(seconds))
+    with terminal.progress_bars() as tell:
+        for done in range(4):
+            tell("models drawn", done, 4)
+    assert capsys.readouterr().err == "models drawn: 1 of 4\nmodels drawn: 3 of 4\n"
+
+
+def test_a_piped_table_cuts_no_name(capsys):
+    names = [f"{word}{'-very-long' * 5}" for word in ("zigzag", "unit", "verdict")]
+    table = tables.plain_table("", "manoeuvre", "unit", "verdict", ">value")
+    table.add_row(*names, "1")
+    terminal.console.print(table)
+    assert names[0] in capsys.readouterr().out
+
+
 def test_names_from_files_do_not_steer_the_terminal(capsys):
     name = "\x1b[31mred\x1b]0;title\x07 [bold]ship[/] :ship: \u202eright to left\x9b2J"
     table = tables.plain_table(name, name)
