@@ -370,7 +370,7 @@ def _check_ships(
         raise InputError(
             f"models: expected 1, or one for each of {num_envs} lanes, got {len(ships)}"
         )
-    refuse_unstable(ships, allow_unstable)
+    _refuse_unstable(ships, allow_unstable)
     first = ships[0]
     if any(other.compiled is not first.compiled for other in ships):
         raise InputError("models: expected one structure in one engine, got several")
@@ -430,29 +430,21 @@ def episode_key(random: np.random.Generator) -> int:
     return int(random.integers(2**63))
 
 
-def refuse_unstable(models: Iterable[ShipModel], allow_unstable: bool = False) -> None:
-    """Refuse models that were found unstable when they were identified.
-
-    InputError, or a warning if `allow_unstable`.
-    """
-    for model in models:
+def _refuse_unstable(ships: Iterable[ShipModel], allow_unstable: bool) -> None:
+    """Refuse, or warn of, a model that was found unstable when it was identified."""
+    for model in ships:
         provenance = model.provenance or {}
-        is_stable = provenance.get("stable", True)
-        if is_stable is False:
-            _refuse_or_warn(model.name, allow_unstable)
-            return
-
-
-def _refuse_or_warn(name: str, allow_unstable: bool) -> None:
-    reason = "one that was found unstable when it was identified"
-    if not allow_unstable:
-        raise InputError(
-            f"model {name!r}: expected a stable ship, got {reason}; identify it from"
-            " more trials or with the guard, or give allow_unstable=True to use it all"
-            " the same"
+        if provenance.get("stable", True) is not False:
+            continue
+        found = (
+            f"model {model.name!r}: expected a stable ship, got one that was found"
+            " unstable when it was identified"
         )
-    warnings.warn(
-        f"model {name!r}: expected a stable ship, got {reason}; do not trust what is"
-        " learned or tuned on it",
-        stacklevel=5,
-    )
+        if not allow_unstable:
+            raise InputError(
+                f"{found}; identify it from more trials or with the guard, or give"
+                " allow_unstable=True to use it all the same"
+            )
+        warnings.warn(
+            f"{found}; do not trust what is learned or tuned on it", stacklevel=4
+        )
