@@ -107,12 +107,12 @@ class EpisodeProgram:
         raise KeyError(name)
 
     def info_row(self, name: str) -> int:
-        """Row of an entry of `info` among the results, and the states behind them."""
+        """Row of an entry of `info` among the results, or the states."""
         rows = self.result_rows
         part = name.removeprefix("reward_")
         constraint = name.removeprefix(CONSTRAINT)
         if name in self.task.reported or constraint != name:
-            return rows.n_rows + self.state_rows["task_state"].row(constraint)
+            return self.state_rows["task_state"].row(constraint)
         if name in Outcome._fields or part == "end":
             return rows["outcome"].row(part)
         parts = self.task.reward_names

@@ -45,7 +45,9 @@ class Arguments(NamedTuple):
     # int64 (1, n): entries of a tile's results at which the rows of outputs begin
     observed: Block
     informed: Block
-    flagged: Block
+    # int64 (1, n): entries of a tile's states at which further rows begin
+    reported: Block
+    flagged: Block  # int64 (1, n): rows of outcomes
     observations: Block  # float32 (n_ships, n_observations)
     # float64 (n_outcomes, n_ships): reward, terminated, truncated, info
     outcomes: Block

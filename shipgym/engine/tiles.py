@@ -49,7 +49,8 @@ class OutputTables(NamedTuple):
     outcomes: Any  # float64 (n_outcomes * n_ships,)
     flags: Any  # bool (n_flags * n_ships,)
     observed: Any  # int64 (n_observations,): entries of results where rows begin
-    informed: Any  # int64 (n_outcomes,): or of results and the states behind them
+    informed: Any  # int64 (n,), the same of the first outcomes
+    reported: Any  # int64 (n,): entries of states, of the other outcomes
     flagged: Any  # int64 (n_flags,): rows of outcomes
     n_ships: int
 
@@ -78,6 +79,7 @@ def outputs_in(memory: Any, output_memory: Any, at: Arguments) -> OutputTables:
         flags=bool_in(output_memory, at.flags),
         observed=int64_row_in(memory, at.observed, 0),
         informed=int64_row_in(memory, at.informed, 0),
+        reported=int64_row_in(memory, at.reported, 0),
         flagged=int64_row_in(memory, at.flagged, 0),
         n_ships=at.observations.rows,
     )
@@ -102,27 +104,26 @@ def write_outputs(tile: Tile, outputs: OutputTables, begin: int, end: int) -> No
             entry = np.uintp(target + lane * width)
             observations[entry] = result[np.uintp(source + lane)]
 
-    n_results = len(result)
+    outcomes = outputs.outcomes
+    n_ships = outputs.n_ships
     for row in range(len(outputs.informed)):
         source = outputs.informed[row]
-        target = first + row * outputs.n_ships
-        if source < n_results:
-            copy_row(outputs.outcomes, target, result, source, begin, end)
-        else:
-            source -= n_results
-            copy_row(outputs.outcomes, target, tile.state, source, begin, end)
-
-    for row in range(len(outputs.flagged)):
-        source = first + outputs.flagged[row] * outputs.n_ships
-        target = first + row * outputs.n_ships
+        target = first + row * n_ships
         for lane in range(begin, end):
-            number = outputs.outcomes[np.uintp(source + lane)]
-            outputs.flags[np.uintp(target + lane)] = number > 0.0
+            outcomes[np.uintp(target + lane)] = result[np.uintp(source + lane)]
 
+    state = tile.state
+    behind = first + len(outputs.informed) * n_ships
+    for row in range(len(outputs.reported)):
+        source = outputs.reported[row]
+        target = behind + row * n_ships
+        for lane in range(begin, end):
+            outcomes[np.uintp(target + lane)] = state[np.uintp(source + lane)]
 
-def copy_row(
-    outcomes: Any, target: int, rows: Any, source: int, begin: int, end: int
-) -> None:
-    """Copy a row of some lanes into the outcomes."""
-    for lane in range(begin, end):
-        outcomes[np.uintp(target + lane)] = rows[np.uintp(source + lane)]
+    flags = outputs.flags
+    for row in range(len(outputs.flagged)):
+        source = first + outputs.flagged[row] * n_ships
+        target = first + row * n_ships
+        for lane in range(begin, end):
+            entry = np.uintp(target + lane)
+            flags[entry] = outcomes[np.uintp(source + lane)] > 0.0

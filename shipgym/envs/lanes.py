@@ -172,11 +172,13 @@ class Lanes:
         outcomes = ("reward", "terminated", "truncated")
         answer = [rows["outcome"].row(name) for name in outcomes]
         info = [self.program.info_row(name) for name in self.task.info_names]
+        of_results = len(info) - len(self.task.reported)
         names = (*outcomes, *self.task.info_names)
         flags = [*outcomes[1:], *self.flag_names]
         return {
             "observed": _first_entries(observed),
-            "informed": _first_entries(answer + info),
+            "informed": _first_entries(answer + info[:of_results]),
+            "reported": _first_entries(info[of_results:]),
             "flagged": np.array([[names.index(name) for name in flags]]),
         }
 

@@ -230,6 +230,8 @@ def _readouts(engine: Engine, lane: int, state: dict[str, float]) -> dict[str, s
         if name in state:
             lines[label] = f"{degrees(state[name]) % 360.0:05.1f} deg"
     lines["rudder"] = f"{degrees(state['delta']):+.1f} deg"
+    if "phi" in state:
+        lines["heel"] = f"{degrees(state['phi']):+.1f} deg"
     if "cross_track" in engine.task.info_names:
         lines["cross-track"] = f"{engine.info('cross_track')[lane]:+.0f} m"
     if state.get("wind_speed"):

@@ -372,9 +372,13 @@ class Task:
     def info_names(self) -> tuple[str, ...]:
         """Names of the numbers in `info`."""
         engine = ("envelope_distance", "extrapolating", "cost")
+        return (*engine, *self.reward_parts, *self.reported)
+
+    @property
+    def reported(self) -> tuple[str, ...]:
+        """Names of those that are fields of the state, constraints last."""
         constraints = [f"{CONSTRAINT}{name}" for name in self.constraints]
-        reported = self.definition.reported
-        return (*reported, *engine, *self.reward_parts, *constraints)
+        return (*self.definition.reported, *constraints)
 
     @property
     def constraints(self) -> tuple[str, ...]:
