@@ -111,13 +111,14 @@ class _Trace:
         """Add bytecode, defaults and globals of a function."""
         if not self._is_new(function):
             return
-        self._visit_code(function.__code__, function.__doc__)
+        own = function.__code__
+        self._visit_code(own, function.__doc__)
         self.visit(function.__defaults__)
         keyword_defaults = function.__kwdefaults__ or {}
         self._visit_all(keyword_defaults.items())
 
         attributes: list[str] = []
-        for code in nested_code(function.__code__):
+        for code in nested_code(own):
             attributes += code.co_names
         for name, value in captured_globals(function, self.hooks):
             hook = function.__globals__.get(name)

@@ -159,7 +159,9 @@ def in_local_water(
     drifted_y = before.y + h * sea.current_east
     left = current_at(drifted_x, drifted_y, settings)
     met = current_at(after.x, after.y, settings)
-    return in_other_water(after, met[0] - left[0], met[1] - left[1])
+    north = met[0] - left[0]
+    east = met[1] - left[1]
+    return in_other_water(after, north, east)
 
 
 def evolved_sea(

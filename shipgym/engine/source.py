@@ -127,14 +127,13 @@ def _check_defaults(record: Any, where: str) -> None:
     """Refuse settings without a default, or with one beyond their bounds."""
     for field in record._fields:
         if field not in record._field_defaults:
-            raise InputError(
-                f"{field_place(record, field, where)}: Settings.{field}: expected"
-                " a default, got none"
-            )
+            place = field_place(record, field, where)
+            raise InputError(f"{place}: Settings.{field}: expected a default, got none")
     for field, kind, setting, default in keywords(record):
         if not is_list(kind):
-            place = f"{field_place(record, field, where)}: Settings.{field}"
-            _setting_of(kind, default, f"{place}: default", setting)
+            place = field_place(record, field, where)
+            name = f"{place}: Settings.{field}: default"
+            _setting_of(kind, default, name, setting)
 
 
 def _check_kind(kind: Any, name: str, place: str) -> None:

@@ -113,7 +113,8 @@ def loaded_names(code: CodeType) -> tuple[str, ...]:
         for instruction in dis.get_instructions(one):
             if instruction.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
                 names.append(instruction.argval)
-    return tuple(dict.fromkeys(names))
+    each_once = dict.fromkeys(names)
+    return tuple(each_once)
 
 
 class Specialisation:

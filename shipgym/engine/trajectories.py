@@ -66,7 +66,8 @@ def sample_sea(out: Any, sea: Any, rng_state: Any, parameters: Any) -> None:
     """Draw the sea around the ship in row 0, `rng_state` seeding its random numbers."""
     if HAS_SEA:
         p = load_sea_parameters(parameters)
-        motion = load_motion(out[0])
+        first = out[0]
+        motion = load_motion(first)
         word = rng_state[0]
         begun = begin_sea(motion, word, p)
         store_sea(sea, 0, begun)

@@ -298,7 +298,8 @@ class ShipsEnv:
             kept = {name: getattr(self, name, None) for name in KEPT}
             engine_state = self._engine.get_state()
             state = (self._asked, engine_state, kept)
-        return rebuild, (type(self), self._arguments, state, attributes)
+        kind = type(self)
+        return rebuild, (kind, self._arguments, state, attributes)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Any:
         _, (kind, arguments, state, attributes) = self.__reduce__()

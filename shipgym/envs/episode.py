@@ -192,11 +192,12 @@ class Episode:
             if key == "n":
                 channels.setdefault("n", orders)
 
-        own_name = f"{self.environment} seed {self.seed} episode {self.number}"
+        if name is None:
+            name = f"{self.environment} seed {self.seed} episode {self.number}"
         return Trial(
             self.t,
             channels,
-            name=own_name if name is None else name,
+            name=name,
             use=use,
             length=self.length,
         )

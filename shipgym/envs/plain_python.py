@@ -82,7 +82,8 @@ def fault_of_interval(
 def _checked(program: EpisodeProgram, name: str, form: Any) -> Callable[..., Any]:
     """Return a function of the task or the sensor set whose results are checked."""
     specialisation = Specialisation(program.hooks)
-    function = specialisation.copy(program.hooks[name])
+    own = program.hooks[name]
+    function = specialisation.copy(own)
     # of a task with another's reward, the function that differs from its own step
     names = function.__globals__
     reward = names.get("reward_of_another")

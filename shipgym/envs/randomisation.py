@@ -43,7 +43,8 @@ class Randomisation:
         if self.model_uncertainty is not None:
             check_choice(self.model_uncertainty, ["covariance"], "model_uncertainty")
         if isinstance(self.ensemble, str | Path | ShipModel):
-            raise unexpected("ensemble", "a list of models", self.ensemble)
+            expected = "a list of models"
+            raise unexpected("ensemble", expected, self.ensemble)
         for name in ("speed_range", "loading_range", "rudder_rate_range"):
             given = getattr(self, name)
             if given is not None:

@@ -211,8 +211,10 @@ def _info_of(infos: Infos, row: int) -> dict[str, Any]:
     for name, values in infos.items():
         if name.startswith(("_", "final_")):
             continue  # masks, and the last values of ended episodes
-        is_group = isinstance(values, dict)
-        info[name] = _info_of(values, row) if is_group else values[row].item()
+        if isinstance(values, dict):
+            info[name] = _info_of(values, row)
+        else:
+            info[name] = values[row].item()
     return info
 
 

@@ -69,8 +69,11 @@ def check_once(model: ShipModel, task: Task, randomisation: Randomisation) -> No
         return
     content = fingerprint(episodes.run, program.hooks)
     asked_for = (model.name, task.settings, task.options)
-    known = cached_path(content, repr(asked_for))
-    mark = known.with_suffix(".sound") if known else None
+    signature = repr(asked_for)
+    known = cached_path(content, signature)
+    mark = None
+    if known:
+        mark = known.with_suffix(".sound")
     if mark and mark.exists():
         return
     found = _checked(model, task, randomisation)

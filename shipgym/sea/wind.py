@@ -99,7 +99,8 @@ def gust_filter(wind: Wind) -> GaussMarkov:
         return GaussMarkov(1.0, 0.0)
     V = wind.speed
     peak = sqrt(3.0) * V / 1800.0
+    variance = HARRIS_VARIANCE * SURFACE_DRAG * V**2
     return GaussMarkov(
         time_constant=1.0 / (2.0 * pi * peak),
-        standard_deviation=sqrt(HARRIS_VARIANCE * SURFACE_DRAG * V**2),
+        standard_deviation=sqrt(variance),
     )

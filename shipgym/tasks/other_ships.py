@@ -179,7 +179,8 @@ def other_ship(
     """
     if meeting.speed == 0.0:
         too_far = Place(1e5 * ship.length, 0.0, 0.0, 0.0)
-        return Other(too_far, Habits(ship.speed, ship.length, 0.0, 0.0, 0.0), 0.0)
+        habits = Habits(ship.speed, ship.length, 0.0, 0.0, 0.0)
+        return Other(too_far, habits, 0.0)
     first = draws_of(number)
     miss = drawn(random, first + MISS_DRAW, -1.0, 1.0) * ship.length
     sine, cosine = sin_cos(meeting.course)
@@ -188,7 +189,8 @@ def other_ship(
     north = meeting.distance - sailed * cosine - miss * sine
     east = miss * cosine - sailed * sine
     away = np.hypot(north, east)
-    further = max(1.0, LEAST_START * ship.length / max(away, 1.0))
+    least = LEAST_START * ship.length
+    further = max(1.0, least / max(away, 1.0))
 
     place = Place(
         x=own.x + further * north,

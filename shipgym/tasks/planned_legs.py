@@ -106,7 +106,10 @@ def next_turn(number: int, plan: Numbers) -> int:
     """Return the next waypoint with a turn, or the last."""
     last = last_waypoint(plan)
     number = min(number + 1, last)
-    while number < last and fabs(change_of_course(number, plan)) < NO_TURN:
+    while number < last:
+        turn = change_of_course(number, plan)
+        if fabs(turn) >= NO_TURN:
+            break
         number += 1
     return number
 
@@ -186,9 +189,11 @@ def on_leg(x: float, y: float, leg: Leg) -> OnLeg:
     """Position from the first waypoint of a leg, along it and across."""
     north = x - leg.north
     east = y - leg.east
+    ahead = north * leg.cosine + east * leg.sine
+    aside = east * leg.cosine - north * leg.sine
     return OnLeg(
-        ahead=north * leg.cosine + east * leg.sine,
-        aside=east * leg.cosine - north * leg.sine,
+        ahead=ahead,
+        aside=aside,
     )
 
 

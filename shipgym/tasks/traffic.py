@@ -103,18 +103,20 @@ def approach(motion: Motion, target: Target) -> Approach:
 
     squared_speed = north * north + east * east
     slowest = 1e-12  # m2/s2, below which the distance stays as it is
-    closing = -(away_x * north + away_y * east)
-    tcpa = closing / max(squared_speed, slowest)
+    opening = away_x * north + away_y * east
+    tcpa = -opening / max(squared_speed, slowest)
     closest_x = away_x + tcpa * north
     closest_y = away_y + tcpa * east
     squared_dcpa = closest_x * closest_x + closest_y * closest_y
     squared_distance = away_x * away_x + away_y * away_y
     to_other = arctan2(away_y, away_x)
     to_own = arctan2(-away_y, -away_x)
+    bearing = to_other - motion.psi
+    aspect = to_own - target.course
     return Approach(
         distance=sqrt(squared_distance),
-        bearing=wrap(to_other - motion.psi),
-        aspect=wrap(to_own - target.course),
+        bearing=wrap(bearing),
+        aspect=wrap(aspect),
         dcpa=sqrt(squared_dcpa),
         tcpa=tcpa,
     )
