@@ -21,17 +21,12 @@ ALL = {"randomise": "all"}
     [
         ({"net_arch": "64"}, r"net_arch: expected widths .* such as \[64, 64\]"),
         ({"ent_coef": "auto_x"}, "ent_coef: expected a number or 'auto' or such as"),
-        ({"ent_coef": "auto_-1"}, "expected a number or 'auto' or such as 'auto_0.1'"),
-        ({"ent_coef": True}, "ent_coef: expected a number"),
         ({"target_entropy": "auto_1"}, "target_entropy: expected a number or 'auto'"),
-        ({"activation": "rely"}, "Did you mean 'relu'"),
         ({"ships": 10, "buffer_size": 9}, "buffer_size: expected at least 10, one for"),
         ({"authority": 2.1, "base": "lq"}, "authority: expected a number > 0 and <= 2"),
         ({"authority": 0.5}, "authority: expected 1 without a base, got 0.5"),
         ({"frame_stack": 2, "base": "lq"}, "frame_stack: expected 1 with a base"),
-        ({"total_steps": 1.5}, "total_steps: expected an integer"),
         ({"base": "designs/mine.toml"}, "base: expected one of 'none', 'tuned', "),
-        ({"base": "lqq"}, "base: .*Did you mean 'lq'"),
         ({"gama": 0.9}, "unknown key 'gama'. Did you mean 'gamma'"),
     ],
 )
@@ -118,8 +113,6 @@ SHAFT = {"action": "rudder-shaft"}
     ("arguments", "message"),
     [
         ({"seed": 800}, "seed: expected an integer of at least 0 and at most 799"),
-        ({"threads": 1025}, "threads: expected an integer of at least 1 and"),
-        ({"settings": {"ships": 1001, "batch_size": 1001}}, "ships: .* at most 1000"),
         ({"settings": {"action_repeat": 601}}, "action_repeat: .* at most 600"),
         ({"options": SHAFT}, "action: .*'mariner'"),
         (

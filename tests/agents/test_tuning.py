@@ -101,18 +101,3 @@ def test_the_command_tunes_and_goes_on_with_a_study(tmp_path):
         assert told["trials"][0]["ended"] == "complete"
         assert len(told["trials"]) == trials
     assert told["settings"] == str(tmp_path / "study" / "best.toml")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["pppo"], "Did you mean 'ppo'"),
-        (["ppo", "--set", "gama=0.9"], "Did you mean 'gamma'"),
-    ],
-)
-def test_wrong_arguments_of_the_command(arguments, message, tmp_path):
-    study = tmp_path / "study"
-    answer = CliRunner().invoke(app, ["tune", *arguments, "--out", str(study)])
-    assert answer.exit_code == 2
-    assert message in answer.stderr.replace("\n", " ")
-    assert not study.exists()
