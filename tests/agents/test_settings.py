@@ -65,10 +65,9 @@ def test_the_command_goes_before_the_file_of_settings_and_that_before_tuned_ones
     settings = make_plan("ppo", settings_file=file, settings=given).settings
     assert (settings.gamma, settings.clip_range, settings.n_epochs) == (0.6, 0.3, 2)
     assert settings.n_steps == load_settings("ppo").n_steps
-    for text, message in ((b"gamma = \n", "not valid TOML"), (b"\xff\xfe", "UTF-16")):
-        file.write_bytes(text)
-        with pytest.raises(InputError, match=message):
-            read_settings_file(file, "ppo")
+    file.write_text("gamma = \n")
+    with pytest.raises(InputError, match="not valid TOML"):
+        read_settings_file(file, "ppo")
 
 
 def test_domain_randomisation_draws_ships_seas_and_speeds_and_leaves_what_was_asked(
