@@ -41,6 +41,7 @@ def trial_of(path, content, **settings):
         (CSV.decode().encode("utf-16"), {}),
         (gzip.compress(CSV, mtime=0), {}),
         (b"made by a logger\n\n" + CSV, {}),
+        (CSV.replace(b"1.5", b'"1.5'), {}),
         (b"t,u\n[s],[m/s]\n" + CSV.removeprefix(b"t,u\n"), {}),
         (CSV + b"t,u\nend of file\n", {}),
         (CSV.replace(b"t,u", b"\xb0,\xe9"), {"columns": {"t": "°", "u": "é"}}),
@@ -176,6 +177,11 @@ def rmc(k, speed="10.0"):
 
 def each_second(*texts, count=6):
     return [text for k in range(count) for text in (rmc(k), *texts)]
+
+
+def test_a_log_of_few_sentences_is_refused(tmp_path):
+    path = nmea_log(tmp_path / "log.nmea", *each_second(count=2))
+    assert "got too few" in refusal(path)
 
 
 @pytest.mark.parametrize(

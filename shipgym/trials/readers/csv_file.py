@@ -163,18 +163,21 @@ def _columns(
         if any(re.match(r"\s*(0\d|\d{9,10}\.)", cells[k]) for cells in samples)
     ]
     points = any("." in row for row in rows[:100])
-    frame = pd.read_csv(
-        io.StringIO("\n".join(rows)),
-        sep=r"\s+" if delimiter == BLANKS else delimiter,
-        header=None,
-        usecols=range(n_cells),
-        keep_default_na=False,
-        na_values=[""],
-        low_memory=False,
-        skipinitialspace=True,
-        decimal="," if has_comma and not points else ".",
-        dtype=dict.fromkeys(as_texts, str),
-    )
+    try:
+        frame = pd.read_csv(
+            io.StringIO("\n".join(rows)),
+            sep=r"\s+" if delimiter == BLANKS else delimiter,
+            header=None,
+            usecols=range(n_cells),
+            keep_default_na=False,
+            na_values=[""],
+            low_memory=False,
+            skipinitialspace=True,
+            decimal="," if has_comma and not points else ".",
+            dtype=dict.fromkeys(as_texts, str),
+        )
+    except pd.errors.ParserError:  # a quote without its other one
+        frame = pd.DataFrame([split(row, delimiter)[:n_cells] for row in rows])
     columns = []
     for _, column in frame.items():
         is_plain = column.dtype.kind in "iuf"

@@ -63,6 +63,10 @@ def read_messages(path: Path, content: bytes) -> LogTable:
     if winds and "psi" in tracks:
         tracks |= wind_over_ground(winds, tracks)
     notes += chosen.notes
+    if not tracks:
+        raise InputError(
+            f"{path}: expected several values of a ship's motion, got too few: log more"
+        )
     return _table(path, tracks, notes, magnetic=chosen.magnetic)
 
 
