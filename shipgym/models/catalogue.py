@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING
 from shipgym.checks import check_choice
 from shipgym.errors import InputError
 from shipgym.models.ship_model import ShipModel
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.reference_ships import published_ships
+from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import (
     REGISTERED_EQUATIONS,
     get_equations,
@@ -20,8 +23,6 @@ from shipgym.ships.structures import (
 if TYPE_CHECKING:  # imported with the ships that need them
     from shipgym.ships.equations import ShipEquations
     from shipgym.ships.grey_boxes import GreyBox
-    from shipgym.ships.particulars import Particulars
-    from shipgym.ships.steering import SteeringGear
     from shipgym.ships.terms import Term
 
 LIBRARY = Path(__file__).parent / "library"
@@ -48,15 +49,20 @@ def model_of(
 
 def mariner(service_speed: float = 7.7175) -> ShipModel:
     """Mariner class cargo ship, 3 degrees of freedom; service speed U0 in m/s."""
-    from shipgym.ships import mariner as file
-
+    ship = published_ships()["mariner"]
+    # the literature writes the polynomials for a rudder positive to port: odd powers
+    # of the rudder change their sign
+    coefficients = {
+        name: value * 1e-5 * (-1.0) ** name.count("d")
+        for name, value in ship["coefficients"].items()
+    }
     return ShipModel(
         name="mariner",
         structure="abkowitz",
-        particulars=file.particulars(service_speed),
-        steering=file.STEERING,
-        coefficients=file.coefficients(),
-        provenance={"source": file.SOURCE},
+        particulars=Particulars(**(ship["particulars"] | {"speed": service_speed})),
+        steering=SteeringGear(**ship["steering"]),
+        coefficients=coefficients,
+        provenance={"source": ship["source"]},
     )
 
 
@@ -92,17 +98,14 @@ def tanker() -> ShipModel:
 
 def kvlcc2() -> ShipModel:
     """KVLCC2 at full scale, 320 m, by the MMG standard method."""
-    from shipgym.ships import kvlcc2 as file
-
-    model = kvlcc2_l7()
-    full_scale = file.Coefficients(**file.FULL_SCALE)
+    model, ship = kvlcc2_l7(), published_ships()["kvlcc2 at full scale"]
     return replace(
         model,
         name="kvlcc2",
-        particulars=file.particulars("KVLCC2", full_scale, 58.0, 7.973889),
-        steering=replace(model.steering, rudder_rate_deg_s=2.34),
-        coefficients={**model.coefficients, **file.FULL_SCALE},
-        service_shaft_speed=1.77851,
+        particulars=Particulars(**ship["particulars"]),
+        steering=SteeringGear(**ship["steering"]),
+        coefficients={**model.coefficients, **ship["coefficients"]},
+        service_shaft_speed=ship["service_shaft_speed"],
     )
 
 

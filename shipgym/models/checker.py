@@ -125,7 +125,10 @@ def _no_acceleration(
     state = ", ".join(f"{name} = {at[name]:.4g}" for name in names)
     look = "for coefficients that are far too large"
     if isinstance(model.dynamics, ShipEquations):
-        place = model.dynamics.fault(at, model.coefficients, ship_of(model))
+        numbers = model.dynamics.numbers(
+            model.coefficients, model.particulars, model.service_shaft_speed
+        )
+        place = model.dynamics.fault(at, numbers.tolist(), ship_of(model))
         look = f"at {place}"
     return (
         f"derivatives: expected a number for the acceleration of '{rate}' at {state}"

@@ -11,9 +11,7 @@ from typing import Any, NamedTuple
 
 from shipgym.engine.mathematics import small_sin_cos
 from shipgym.engine.motion import Motion, Ship
-from shipgym.ships.equations import ShipEquations, record_of
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.steering import SteeringGear
+from shipgym.ships.equations import ShipEquations, published
 
 LENGTH = 175.0  # m
 WEIGHT = 9.81 * 21222.0  # by density, m^4/s^2, of the displaced volume
@@ -21,84 +19,9 @@ RUDDER_AREA = 33.0376  # m^2
 ASPECT_RATIO = 1.8219
 DIAMETER = 6.533  # of the propeller, m
 
-#: As published; without unit but for the metacentric height GM, m.
-Coefficients = record_of(
-    {
-        "GM": 0.3,
-        # mass and added mass, their moments of inertia and lever arms
-        "m": 0.00792,
-        "mx": 0.000238,
-        "my": 0.007049,
-        "Ix": 0.0000176,
-        "Jx": 0.0000034,
-        "Iz": 0.000456,
-        "Jz": 0.000419,
-        "lx": 0.0313,
-        "ly": 0.0313,
-        "alpha_y": 0.05,
-        # hull; the index f is heel
-        "X_uu": -0.0004226,
-        "X_vr": -0.00311,
-        "X_vv": -0.00386,
-        "X_rr": 0.00020,
-        "X_ff": -0.00020,
-        "Y_v": -0.0116,
-        "Y_r": 0.00242,
-        "Y_p": 0.0,
-        "Y_f": -0.000063,
-        "Y_vvv": -0.109,
-        "Y_rrr": 0.00177,
-        "Y_vvr": 0.0214,
-        "Y_vrr": -0.0405,
-        "Y_vvf": 0.04605,
-        "Y_vff": 0.00304,
-        "Y_rrf": 0.009325,
-        "Y_rff": -0.001368,
-        "K_v": 0.0003026,
-        "K_r": -0.000063,
-        "K_p": -0.0000075,
-        "K_f": -0.000021,
-        "K_vvv": 0.002843,
-        "K_rrr": -0.0000462,
-        "K_vvr": -0.000588,
-        "K_vrr": 0.0010565,
-        "K_vvf": -0.0012012,
-        "K_vff": -0.0000793,
-        "K_rrf": -0.000243,
-        "K_rff": 0.00003569,
-        "N_v": -0.0038545,
-        "N_r": -0.00222,
-        "N_p": 0.000213,
-        "N_f": -0.0001424,
-        "N_vvv": 0.001492,
-        "N_rrr": -0.00229,
-        "N_vvr": -0.0424,
-        "N_vrr": 0.00156,
-        "N_vvf": -0.019058,
-        "N_vff": -0.0053766,
-        "N_rrf": -0.0038592,
-        "N_rff": 0.0024195,
-        # propeller and rudder
-        "t": 0.175,
-        "wp": 0.184,
-        "tau": 1.09,
-        "xp": -0.526,
-        "c_pv": 0.0,
-        "c_pr": 0.0,
-        "kappa": 0.631,
-        "epsilon": 0.921,
-        "c_RX": 0.71,
-        "a_H": 0.237,
-        "z_R": 0.033,
-        "x_R": -0.5,
-        "x_H": -0.48,
-        "gamma": 0.088,
-        "c_Rr": -0.156,
-        "c_Rrrr": -0.275,
-        "c_Rrrv": 1.96,
-    },
-    __name__,
-)
+#: As published (`reference_ships.json`); without unit but for the metacentric height.
+PUBLISHED = published("container", __name__)
+Coefficients = PUBLISHED["coefficients_record"]
 
 
 class State(NamedTuple):
@@ -301,35 +224,9 @@ def shaft_acceleration(n: float, command: float, c: Any, ship: Ship) -> float:
     return (order - n) * per_T
 
 
-PUBLISHED = Coefficients()
 SHIP = ShipEquations(
-    "container",
-    "Son & Nomoto 1981, On the coupled motion of steering and rolling of a high speed"
-    " container ship",
-    Coefficients,
-    accelerations,
-    Particulars(
-        name="Container ship S175",
-        length=LENGTH,
-        beam=25.40,
-        draught=8.50,
-        mass=PUBLISHED.m * (0.5 * 1025.0 * LENGTH**3),
-        xg=0.0,
-        yaw_gyradius=LENGTH * (PUBLISHED.Iz / PUBLISHED.m) ** 0.5,
-        block_coefficient=0.559,
-        speed=8.376672395256,
-        rudder_area=RUDDER_AREA,
-        propeller_diameter=DIAMETER,
-        metacentric_height=PUBLISHED.GM,
-        water_density=1025.0,
-        X_udot=-PUBLISHED.mx,
-        Y_vdot=-PUBLISHED.my,
-        Y_rdot=-PUBLISHED.my * PUBLISHED.alpha_y,
-        N_vdot=-PUBLISHED.my * PUBLISHED.alpha_y,
-        N_rdot=-PUBLISHED.Jz,
-    ),
-    SteeringGear(rudder_rate_deg_s=5.0, time_constant=1.0),
+    accelerations=accelerations,
     shaft_acceleration=shaft_acceleration,
-    service_shaft_speed=80.0 / 60.0,
     rolls=True,
+    **PUBLISHED,
 )

@@ -11,7 +11,7 @@ from __future__ import annotations
 import importlib
 import math
 from collections import namedtuple
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
@@ -33,6 +33,7 @@ from shipgym.python_files import (
     refuse_closure,
 )
 from shipgym.ships.particulars import Particulars
+from shipgym.ships.reference_ships import published_ships
 from shipgym.ships.steering import SteeringGear
 
 ACCELERATIONS = ("udot", "vdot", "rdot", "pdot", "qdot")
@@ -46,6 +47,19 @@ def record_of(values: Mapping[str, float], module: str) -> Any:
     record = namedtuple("Coefficients", names, defaults=defaults, module=module)  # type: ignore[misc]
     record.__annotations__ = dict.fromkeys(names, float)
     return record
+
+
+def published(name: str, module: str) -> dict[str, Any]:
+    """Fields of `ShipEquations` that were published of a reference ship."""
+    table = published_ships()[name]
+    return {
+        "name": name,
+        "source": table["source"],
+        "coefficients_record": record_of(table["coefficients"], module),
+        "particulars": Particulars(**table["particulars"]),
+        "steering": SteeringGear(**table["steering"]),
+        "service_shaft_speed": table["service_shaft_speed"],
+    }
 
 
 @dataclass(frozen=True)
@@ -116,7 +130,7 @@ class ShipEquations:
             expected = "a NamedTuple of floats"
             raise unexpected(f"{where}: coefficients_record", expected, record)
         values = record._field_defaults  # type: ignore[attr-defined]
-        for name in self.coefficient_names:
+        for name in field_types(record):
             place = f"{where}: coefficient {name!r}"
             if name not in values:
                 raise InputError(f"{place}: expected a default, got no value")
@@ -167,14 +181,13 @@ class ShipEquations:
                 raise unexpected(name, "a number, int or float", value)
 
     def fault(
-        self, state: Mapping[str, float], coefficients: Mapping[str, float], ship: Ship
+        self, state: Mapping[str, float], numbers: Sequence[Any], ship: Ship
     ) -> str:
         """Place where plain Python fails at a state, and why."""
         at = {name: state.get(name, 0.0) for name in Motion._fields}
-        motion = Motion(**at)
-        c = self.coefficients_record(**coefficients)
+        c = self.coefficients_record(*numbers)
         try:
-            asked(self.accelerations, motion, c, ship)
+            asked(self.accelerations, Motion(**at), c, ship)
         except InputError as error:
             return str(error)
         return place_of(self.accelerations)

@@ -10,7 +10,7 @@ at any scale.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import copysign, fabs, pi, sqrt
 from typing import Any, ClassVar, NamedTuple
 
@@ -19,10 +19,10 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.engine.mathematics import arctan2, exponential, small_sin_cos
 from shipgym.engine.motion import Motion, Ship
-from shipgym.ships import kvlcc2
 from shipgym.ships.equations import ShipEquations, record_of
-from shipgym.ships.kvlcc2 import Mass, planar_accelerations
 from shipgym.ships.particulars import Particulars
+from shipgym.ships.reference_ships import published_ships
+from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import MMG
 
 #: Coefficients that are identified: hull by rho L d U^2 / 2 (moments L more), added
@@ -131,14 +131,43 @@ def dimensions(p: Particulars) -> dict[str, float]:
 
 
 #: KVLCC2 as a model of 7 m.
-STANDARD = standard_form(kvlcc2.SHIP.coefficients, 1.179, 11.85159) | {
-    "nD_U0": 2.171283
-}
-PUBLISHED = kvlcc2.Coefficients()
-PARTICULARS = replace(
-    kvlcc2.SHIP.particulars, rudder_aspect_ratio=PUBLISHED.H_R**2 / PUBLISHED.A_R
+KVLCC2 = published_ships()["kvlcc2"]
+STANDARD = standard_form(KVLCC2["coefficients"], 1.179, 11.85159) | {"nD_U0": 2.171283}
+PARTICULARS = Particulars(
+    **KVLCC2["particulars"], rudder_aspect_ratio=0.345**2 / 0.0539
 )
 Coefficients = record_of(STANDARD | dimensions(PARTICULARS), __name__)
+
+
+class Mass(NamedTuple):
+    """Mass with added mass, by density."""
+
+    surge: float  # m + m_x
+    sway: float  # m + m_y
+    static: float  # x_G m
+    yaw: float  # I_zG + x_G^2 m + J_z
+
+
+def planar_accelerations(
+    motion: Motion, X: float, Y: float, N: float, mass: Mass
+) -> tuple[float, float, float]:
+    """Accelerations in surge, sway and yaw by forces.
+
+    (m + m_x) udot - (m + m_y) v r - x_G m r^2 = X
+    (m + m_y) vdot + (m + m_x) u r + x_G m rdot = Y
+    (I_zG + x_G^2 m + J_z) rdot + x_G m (vdot + u r) = N
+    """
+    u, v, r = motion.u, motion.v, motion.r
+    surge = X + mass.sway * v * r + mass.static * r * r
+    sway = Y - mass.surge * u * r
+    yaw = N - mass.static * u * r
+
+    determinant = mass.sway * mass.yaw - mass.static**2
+    udot = surge * (1.0 / mass.surge)
+    coupled = mass.yaw * sway - mass.static * yaw
+    vdot = coupled * (1.0 / determinant)
+    rdot = (yaw - mass.static * vdot) * (1.0 / mass.yaw)
+    return udot, vdot, rdot
 
 
 class Flow(NamedTuple):
@@ -310,10 +339,10 @@ class MMGEquations(ShipEquations):
 
 SHIP = MMGEquations(
     MMG,
-    kvlcc2.SHIP.source + "; general form",
+    KVLCC2["source"] + "; general form",
     Coefficients,
     accelerations,
     PARTICULARS,
-    kvlcc2.SHIP.steering,
-    service_shaft_speed=kvlcc2.SHIP.service_shaft_speed,
+    SteeringGear(**KVLCC2["steering"]),
+    service_shaft_speed=KVLCC2["service_shaft_speed"],
 )

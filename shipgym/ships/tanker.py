@@ -11,64 +11,15 @@ from typing import Any
 
 from shipgym.engine.mathematics import arctan2
 from shipgym.engine.motion import Motion, Ship
-from shipgym.ships.equations import ShipEquations, record_of
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.steering import SteeringGear
+from shipgym.ships.equations import ShipEquations, published
 
 LENGTH = 304.8  # m
 DRAUGHT = 18.46  # m
 
-#: As published; the index z is by draught over water below the keel, c by the speed of
-#: the race.
-Coefficients = record_of(
-    {
-        # thrust
-        "t": 0.22,
-        "c_un": 0.605,
-        "c_nn": 38.2,
-        "T_uu": -0.00695,
-        "T_un": -0.00063,
-        "T_nn": 0.0000354,
-        # hull and rudder
-        "X_uu": -0.0377,
-        "X_vv": 0.3,
-        "X_ccdd": -0.093,
-        "X_ccbd": 0.152,
-        "Y_uv": -1.205,
-        "Y_vv": -2.400,
-        "Y_ccd": 0.208,
-        "Y_ccbbd": -2.16,
-        "Y_T": 0.04,
-        "N_uv": -0.451,
-        "N_vr": -0.300,
-        "N_ccd": -0.098,
-        "N_ccbbd": 0.688,
-        "N_T": -0.02,
-        "d11": 2.020,
-        "d22": -0.752,
-        "d33": -0.231,
-        # mass and added mass by mass
-        "m11": 1.050,
-        "m22": 2.020,
-        "m33": 0.1232,
-        # shallow water
-        "X_udotz": -0.05,
-        "Y_vdotz": -0.387,
-        "N_rdotz": -0.0045,
-        "X_uuz": -0.0061,
-        "X_vrz": 0.387,
-        "X_vvzz": 0.0125,
-        "Y_urz": 0.182,
-        "Y_vvz": -1.5,
-        "Y_uvz": -0.85,
-        "Y_ccbbdz": -0.191,
-        "N_urz": -0.047,
-        "N_vrz": -0.120,
-        "N_uvz": -0.241,
-        "N_ccbbdz": 0.344,
-    },
-    __name__,
-)
+#: As published (`reference_ships.json`); the index z is by draught over water below the
+#: keel, c by the speed of the race.
+PUBLISHED = published("tanker", __name__)
+Coefficients = PUBLISHED["coefficients_record"]
 
 
 def accelerations(
@@ -141,23 +92,9 @@ def shaft_acceleration(n: float, command: float, c: Any, ship: Ship) -> float:
 
 
 SHIP = ShipEquations(
-    "tanker",
-    "van Berlekom & Goddard 1972, Maneuvering of large tankers",
-    Coefficients,
-    accelerations,
-    Particulars(
-        name="Esso 190 000 dwt tanker",
-        length=LENGTH,
-        beam=47.17,
-        draught=DRAUGHT,
-        mass=220_000.0 * 1025.0,
-        block_coefficient=0.83,
-        speed=8.225749013527,
-        water_density=1025.0,
-    ),
-    SteeringGear(rudder_rate_deg_s=2.33, time_constant=1.0),
+    accelerations=accelerations,
     shaft_acceleration=shaft_acceleration,
-    service_shaft_speed=80.0 / 60.0,
     shallow_water=True,
     astern=True,
+    **PUBLISHED,
 )

@@ -65,17 +65,6 @@ def motions(count: int = 200) -> list[Motion]:
     return found
 
 
-def test_kvlcc2_in_the_general_form_has_her_own_accelerations() -> None:
-    ship = Ship(
-        7.0, 1.179, 0.6, 0.3, 0.0, kvlcc2.SHIP.service_shaft_speed, math.inf, 1.179
-    )
-    for motion in motions():
-        own = np.array(kvlcc2.accelerations(motion, kvlcc2.Coefficients(), ship)[:3])
-        np.testing.assert_allclose(
-            at(ship_of({}), motion), own, rtol=0.0, atol=1e-13 * np.abs(own).max()
-        )
-
-
 def test_terms_beyond_the_standard_form_act_as_they_are_named() -> None:
     motion = Motion(0.0, 0.0, 0.0, 0.7, -0.15, 0.07, 0.0, 0.0, 0.0, 0.4, 11.85)
     mirrored = motion._replace(v=-motion.v, r=-motion.r, delta=-motion.delta)
