@@ -1,6 +1,6 @@
 """Predict measured ships and write `docs/real_ships.md`.
 
-python scripts/predict_real_ships.py [a] ... [d]
+python scripts/predict_real_ships.py [a] [b] [c]
 
 Takes about ten minutes in all, most of it for case a. The measurements lie beside the
 checkout.

@@ -18,7 +18,6 @@ CASES = {
     "a": "mmg",
     "b": "mei",
     "c": "esso_osaka",
-    "d": "captive",
 }
 
 

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from agents.controllers.controller import Controller
+from agents import Controller
 from agents.controllers.guided import Guided
 from agents.controllers.law import Nothing
 from agents.controllers.memory import from_columns

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
+from shipgym import SteeringGear
 from shipgym.models import load_model
-from shipgym.ships.steering import SteeringGear
 
 MARINER = load_model("mariner")
 LENGTH_TIME = MARINER.travel_time

@@ -6,7 +6,6 @@ import pytest
 from agents.rollouts.metrics import (
     evaluate,
     path_following,
-    reversals,
     steering,
     succeeded,
     worst_step_cost,
@@ -36,21 +35,6 @@ class Steers:
 
 def steady(rudder):
     return Steers(lambda call, seen: np.full((len(seen), 1), rudder, dtype=np.float32))
-
-
-def test_reversals_within_the_dead_band_are_none():
-    t = np.linspace(0.0, 4.0 * np.pi, 401)
-    angle = np.radians(np.stack([5.0 * np.sin(t), 0.2 * np.sin(t), t], axis=1))
-    counts = np.ones((400, 3), dtype=np.bool_)
-    assert reversals(angle, counts).tolist() == [
-        4.0,
-        0.0,
-        0.0,
-    ]  # two periods: four turns; a tremble; a ramp
-    counts[100:] = False
-    assert reversals(angle, counts).tolist() == [1.0, 0.0, 0.0]
-    to_and_fro = np.radians(np.outer([0.0, 1.0, 0.0, 1.0, 0.0], [0.48, 0.52]))
-    assert reversals(to_and_fro, np.ones((4, 2), dtype=np.bool_)).tolist() == [0.0, 3.0]
 
 
 def test_figures_of_steering_and_of_paths_by_hand():

@@ -25,7 +25,6 @@ from agents import (
 from agents.cli import app
 from agents.controllers.guided import TURNS, bend
 from agents.controllers.law import Turns
-from agents.export.autopilot import AUTOPILOT_INPUTS, BridgeInput
 from agents.export.autopilot_c99 import autopilot_source
 from agents.export.ship_c99 import ShipInput, advance, ship_source
 from shipgym.engine.motion import Motion
@@ -36,7 +35,7 @@ from shipgym.sea import Current, Weather, Wind
 from shipgym.sea.open_sea import OPEN_SEA
 from shipgym.sea.weather_column import CALM
 from shipgym.ships.kernel_boxes import Kernel, kernel_box
-from shipgym.tasks.task import path_following_task
+from shipgym.tasks import path_following_task
 from tests.agents.bridge import Bridge
 from tests.agents.compiling import built
 from tests.agents.policies import MARINER, random_network, random_policy
@@ -346,10 +345,6 @@ def test_guidance_orders_what_it_commands_along_a_path(kind):
         action, state = agent.predict(seen, state, step == 0)
         assert order / bridge.limit == pytest.approx(action[0], abs=2e-5)
         seen, *_ = env.step(action)
-
-
-def test_every_input_has_its_unit_and_meaning():
-    assert list(BridgeInput._fields) == list(AUTOPILOT_INPUTS)
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ import pytest
 from agents import LQ, LQG, PID, check_controller
 from shipgym.errors import InputError
 from shipgym.models import load_model
+from shipgym.tasks import path_following_task
 from shipgym.tasks.scales import OBSERVATION_NAMES
-from shipgym.tasks.task import path_following_task
 
 MARINER = load_model("mariner")
 

@@ -12,9 +12,8 @@ from agents import LQ, PID, load_agent
 from agents.agent_file import PRETRAINED, find_agent, list_pretrained
 from agents.controllers.interface import model_hash
 from agents.controllers.registry import CLASSICAL, controller_class
+from shipgym import SteeringGear
 from shipgym.errors import InputError
-from shipgym.models.catalogue import mariner
-from shipgym.ships.steering import SteeringGear
 from tests.agents.mariners import MARINER
 
 DESIGNS = {
@@ -28,6 +27,9 @@ CORPUS = {
 }
 NAMES = list(DESIGNS["pid"].observation_names)
 SCALES = list(DESIGNS["pid"].observation_scales)
+
+
+SLOW = replace(MARINER, particulars=replace(MARINER.particulars, speed=4.0))
 
 
 def changed(kind, tmp_path, changes):
@@ -179,7 +181,10 @@ def test_an_agent_is_found_by_its_file_its_folder_or_its_name(tmp_path, monkeypa
 @pytest.mark.parametrize(
     ("model", "message"),
     [
-        (mariner(service_speed=4.0), r"'yaw_rate': expected 0\.0479.*, got 0\.0248"),
+        (
+            SLOW,
+            r"'yaw_rate': expected 0\.0479.*, got 0\.0248",
+        ),
         (
             replace(MARINER, steering=SteeringGear(35.0, 5.0, 1.0)),
             "'rudder': .*rudder limit",

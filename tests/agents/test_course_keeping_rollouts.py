@@ -9,7 +9,7 @@ import pytest
 from agents import LQ, PID, sail, step_response
 from shipgym.errors import InputError
 from shipgym.models import load_model
-from shipgym.tasks.task import course_keeping_task
+from shipgym.tasks import course_keeping_task
 
 MARINER = load_model("mariner")
 PILOT = PID.from_model(MARINER)

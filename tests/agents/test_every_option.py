@@ -18,8 +18,8 @@ import typer
 from typer.testing import CliRunner
 
 import agents
+from agents import PID
 from agents.cli import app
-from agents.controllers.pid import PID
 from shipgym import RecordEpisode, example_ship, load_model
 from tests.agents.small_suite import write_suite
 

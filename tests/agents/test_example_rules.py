@@ -3,7 +3,7 @@
 import numpy as np
 from encounter_rule import factory
 
-from agents.rollouts.rollout import rollout
+from agents import rollout
 from agents.suites.suite import BenchmarkTask
 
 

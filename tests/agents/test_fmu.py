@@ -15,7 +15,7 @@ from agents.export.fmu import write_fmu
 from agents.export.ship_c99 import ship_source
 from shipgym.errors import InputError
 from shipgym.sea import Current, Weather, Wind
-from shipgym.tasks.task import Task
+from shipgym.tasks import Task
 from tests.agents.bridge import Bridge
 from tests.agents.policies import MARINER
 

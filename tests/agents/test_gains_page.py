@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, WheelOver
-from shipgym.tasks.task import Task
+from shipgym.tasks import Task
 from tests.agents.bridge import Bridge
 from tests.agents.policies import MARINER
 

@@ -15,7 +15,7 @@ from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.models import load_model
 from shipgym.sea import Current, Weather
-from shipgym.tasks.task import path_following_task
+from shipgym.tasks import path_following_task
 
 MARINER = load_model("mariner")
 LENGTH, SPEED = MARINER.particulars["length"], MARINER.particulars["speed"]

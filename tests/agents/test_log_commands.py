@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from agents.cli import main
+from shipgym import ShipFile
 from shipgym.trials.guesses import guess_columns
 from shipgym.trials.readers.log_table import LogTable
-from shipgym.trials.ship_file import ShipFile
 
 
 @pytest.fixture

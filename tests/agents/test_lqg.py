@@ -9,8 +9,7 @@ from agents.controllers.kalman import kalman_gain, rudder_response
 from agents.controllers.linear_loop import sample_ship
 from shipgym.errors import InputError
 from shipgym.models.linear import straight_running
-from shipgym.tasks.scales import control_interval
-from shipgym.tasks.task import course_keeping_task
+from shipgym.tasks import control_interval, course_keeping_task
 from tests.agents.mariners import MARINER, changed
 
 UNSTABLE = changed(N_v=1.7, N_uv=1.7)

@@ -7,7 +7,7 @@ from agents import LQ, LQG, PID
 from agents.controllers.linear_loop import SIGNALS, sample_ship
 from agents.controllers.margins import largest_pole
 from shipgym.errors import InputError
-from shipgym.tasks.scales import control_interval
+from shipgym.tasks import control_interval
 from tests.agents.mariners import LAGGING, MARINER, changed
 
 RUDDER = np.array(SIGNALS) == "rudder"

@@ -11,7 +11,7 @@ from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.models import load_model
 from shipgym.sea import Current, Weather
-from shipgym.tasks.task import path_following_task
+from shipgym.tasks import path_following_task
 from tests.agents.mariners import MARINER
 
 

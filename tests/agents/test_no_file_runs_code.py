@@ -19,7 +19,7 @@ from agents.training.plan import make_plan
 from agents.training.run_folder import begin_folder
 from identification.models.grey_box import chosen_box
 from shipgym import InputError, ShipFile, ShipModel, load_model
-from shipgym.pages.templates import environment
+from shipgym.pages import environment
 from shipgym.plots.style import plain_texts
 from shipgym.ships import term_functions
 from shipgym.ships.term_functions import accelerations_function, accelerations_source

@@ -1,6 +1,8 @@
 """A learned policy steers as its network and its base say, and refuses what it was not
 made for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,12 +10,12 @@ from agents import LQ, LQG, check_controller, sail
 from agents.policies.policy import ORDERS, order_numbers
 from shipgym.errors import InputError
 from shipgym.models import load_model
-from shipgym.models.catalogue import mariner
-from shipgym.tasks.task import course_keeping_task, path_following_task
+from shipgym.tasks import course_keeping_task, path_following_task
 from tests.agents.policies import MARINER, random_network, random_policy
 
 RNG = np.random.default_rng(1)
 SEEN = RNG.uniform(-1.0, 1.0, (30, 8)).astype(np.float32)
+SLOW = replace(MARINER, particulars=replace(MARINER.particulars, speed=4.0))
 LQ_MARINER = LQ.from_model(MARINER)
 WITH_MEMORY = {
     "frame stack": {"frame_stack": 3},
@@ -135,7 +137,7 @@ def shown_by(task):
 #: What a policy is used for, and what the message says.
 MISUSES = [
     (
-        lambda: random_policy().check_fits_model(mariner(service_speed=4.0)),
+        lambda: random_policy().check_fits_model(SLOW),
         "model 'mariner': scale of 'yaw_rate': .* policy 'learned'",
     ),
     (

@@ -15,7 +15,7 @@ from shipgym import load_model
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.sea import Current, Weather
-from shipgym.tasks.task import path_following_task
+from shipgym.tasks import path_following_task
 from tests.agents.mariners import MARINER
 
 PATH = path_following_task(max_turn_deg=90.0, leg_lengths=[12.0, 16.0])

@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents import PID
-from agents.rollouts.course_keeping import sail
+from agents import PID, sail
 from agents.verification.chain import or_simpler, write_agents, write_findings
 from agents.verification.closed_loop import (
     SHARES,

@@ -9,9 +9,15 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from agents import LQ, benchmark, check_controller, load_agent, register_controller
+from agents import (
+    LQ,
+    Controller,
+    benchmark,
+    check_controller,
+    load_agent,
+    register_controller,
+)
 from agents.controllers import registry
-from agents.controllers.controller import Controller
 from agents.controllers.law import Nothing, linear_law
 from agents.suites.suite import find_task
 from agents.training.algorithms import design_base

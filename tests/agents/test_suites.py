@@ -9,7 +9,6 @@ import pytest
 
 import shipgym
 from agents.suites.environments import read_environment
-from agents.suites.limits import exceeded
 from agents.suites.suite import (
     BenchmarkTask,
     find_task,
@@ -252,22 +251,3 @@ def test_tuned_settings_are_tables_by_task(tmp_path):
             load_tuned(str(write_suite(tmp_path, tuned=content)))
     tasks = {"calm": {"lq": {"cost": 1.0}}}
     assert load_tuned(str(write_suite(tmp_path, tuned={"tasks": tasks}))) == tasks
-
-
-def test_limits_are_read_and_what_exceeds_them_is_named():
-    text = """
-name = "own-v1"
-[tasks.calm]
-environment = "path-following"
-model = "mariner"
-[tasks.calm.limits]
-heel_deg = 10.0
-rudder_reversals_min = 2.0
-"""
-    task = parse_suite(text, "own").task("calm")
-    assert task.limits == {"heel_deg": 10.0, "rudder_reversals_min": 2.0}
-    assert BenchmarkTask.from_dict(task.to_dict()).limits == task.limits
-    statistics = {"mean": 3.0, "median": 0.0, "p95": 9.0}
-    metrics = {"heel_deg": statistics, "rudder_reversals_min": statistics}
-    assert exceeded(task.limits, metrics) == {"rudder_reversals_min": 3.0}
-    assert exceeded(task.limits, {}) == {}

@@ -11,7 +11,7 @@ from agents import load_agent
 from agents.cli import app
 from agents.rollouts.rollout import episode_costs
 from agents.training import training
-from agents.training.algorithms import make_agent, make_ships, set_deviation
+from agents.training.algorithms import make_agent, make_ships
 from agents.training.plan import EVALUATION_SEED, make_plan
 from shipgym.errors import InputError
 
@@ -162,15 +162,6 @@ def test_a_checkpoint_that_is_broken_or_of_another_run_is_refused(tmp_path):
         kept.write_bytes(content)
         with pytest.raises(InputError, match=r"checkpoint\.pt: cut short, or it does"):
             train(plan, tmp_path / "run", resume=True)
-
-
-def test_exploration_falls_to_what_is_asked():
-    plan = tiny(log_std_init=-1.0, log_std_end=-3.0)
-    agent = make_agent(plan, None)
-    for steps, expected in ((384, -2.0), (800, -3.0)):
-        agent.num_timesteps = steps
-        set_deviation(agent, plan.settings)
-        assert agent.policy.log_std.item() == pytest.approx(expected)
 
 
 def test_rewards_are_divided_by_their_scale():

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from agents.export.c_syntax import c_name, literal
 from agents.export.source import with_prelude
 from agents.export.translator import Translator
 from shipgym.engine import mathematics
@@ -223,13 +222,3 @@ def test_what_c_has_no_words_for_is_refused_with_its_line(function, line, said):
 
 def wrap(x):
     return x
-
-
-def test_numbers_and_names_are_those_of_c():
-    numbers = {0.1: "0.1", -2.0: "(-2.0)", 3: "3", True: "1", 1e300: "1e+300"}
-    numbers |= {math.inf: "HUGE_VAL", -math.inf: "(-HUGE_VAL)"}
-    assert {number: literal(number) for number in numbers} == numbers
-    assert literal(math.nan) == "NAN"
-    assert [c_name(name) for name in ("double", "heading")] == ["double_", "heading"]
-    with pytest.raises(InputError, match="name: expected ASCII letters"):
-        c_name("é")

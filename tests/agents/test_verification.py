@@ -8,7 +8,6 @@ import pytest
 
 from agents import WheelOver
 from agents.verification.chain import build_autopilot
-from agents.verification.page import headline, is_certain
 from agents.verification.refusal import lost_track
 from agents.verification.result import track_metrics
 from agents.verification.tracks import keep_track, track_task
@@ -49,91 +48,6 @@ def test_the_first_ship_of_a_track_is_the_identified_one_and_the_others_are_draw
         False,
         0,
     )
-
-
-def criterion(passed, decided=True):
-    return SimpleNamespace(passed=passed, decided=decided, manoeuvre="", run="")
-
-
-@pytest.mark.parametrize(
-    ("criteria", "runaway", "lost", "said"),
-    [
-        (
-            {"advance": True},
-            0,
-            0,
-            (
-                "is stable and meets all IMO criteria. LQ steers best and keeps control"
-                " of all 9"
-            ),
-        ),
-        (
-            {"advance": True, "tactical_diameter": False},
-            0,
-            0,
-            "is stable but misses the IMO criterion of tactical",
-        ),
-        (
-            {"advance": True, "tactical_diameter": None},
-            0,
-            0,
-            "misses no IMO criterion that these trials decide. Not",
-        ),
-        (
-            {"advance": None},
-            0,
-            0,
-            "Not decided by these trials: advance. LQ steers best",
-        ),
-        (
-            {"advance": True},
-            2,
-            0,
-            "all IMO criteria. 2 of 9 models drawn run away in a manoeuvre. LQ steers",
-        ),
-        (
-            {"advance": True},
-            0,
-            4,
-            "LQ steers best and loses control of 4 of 9 models drawn.",
-        ),
-    ],
-)
-def test_the_verdict_says_what_is_met_missed_and_not_decided(
-    criteria, runaway, lost, said
-):
-    best = SimpleNamespace(
-        name="LQ", episodes=SimpleNamespace(terminated=np.arange(9) < lost)
-    )
-    made = {
-        name: criterion(passed, passed is not None) for name, passed in criteria.items()
-    }
-    manoeuvres = SimpleNamespace(criteria=made, unstable=np.arange(9) < runaway)
-    found = SimpleNamespace(draws=9, pilots=[best], manoeuvres=manoeuvres, left_out=0)
-    told = headline(found)
-    assert told.startswith("The model ")
-    assert said in told
-
-
-@pytest.mark.parametrize(
-    ("passed", "runaway", "lost", "certain"),
-    [
-        ((True, True), 0, 0, True),
-        ((True, None), 0, 0, False),
-        ((False, True), 0, 0, False),
-        ((True, True), 1, 0, False),
-        ((True, True), 0, 1, False),
-        ((False, None), 2, 3, False),
-    ],
-)
-def test_a_verdict_is_certain_if_all_is_met_and_no_model_drawn_is_lost(
-    passed, runaway, lost, certain
-):
-    best = SimpleNamespace(episodes=SimpleNamespace(terminated=np.arange(9) < lost))
-    criteria = dict(enumerate(map(criterion, passed)))
-    manoeuvres = SimpleNamespace(criteria=criteria, unstable=np.arange(9) < runaway)
-    found = SimpleNamespace(pilots=[best], manoeuvres=manoeuvres, left_out=0)
-    assert is_certain(found) == certain
 
 
 def test_a_path_autopilot_that_does_not_arrive_on_the_identified_model_is_refused():

@@ -9,7 +9,7 @@ from agents.rollouts.rollout import episode_costs
 from shipgym.envs.engine import Engine
 from shipgym.models.linear import straight_running
 from shipgym.sea import Current, Weather
-from shipgym.tasks.task import path_following_task
+from shipgym.tasks import path_following_task
 from tests.agents.mariners import MARINER
 
 LENGTH, SPEED = MARINER.particulars["length"], MARINER.particulars["speed"]

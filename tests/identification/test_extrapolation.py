@@ -7,7 +7,6 @@ from identification.judging.extrapolation import (
     beyond_trials,
     holds_turn,
 )
-from identification.judging.sentences import turn_sentences
 from shipgym import ShipModel, Trial, load_model
 from shipgym.manoeuvres import turning_circle, zigzag
 
@@ -48,10 +47,3 @@ def test_draws_turn_by_the_error_that_the_trials_show(zigzags: list[Trial]) -> N
     assert scatter(wider) > 0.6 * told["hard_turn"]["size"]
     turned = [*zigzags, turning_circle(model, 35.0, 2000.0, 5.0)]
     assert beyond_trials(model, lambda places: other, turned) == (model, {})
-
-
-def test_the_page_says_what_holds_the_turn_and_by_how_much() -> None:
-    error = {"hard_turn": {"size": 0.1, "how": "assumed"}}
-    (told,) = turn_sentences({"model_error": error})
-    assert "known to 10 %" in told
-    assert turn_sentences({}) == []

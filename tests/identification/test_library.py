@@ -8,7 +8,6 @@ import pytest
 
 import shipgym
 from identification import identify
-from shipgym.envs.environment import DEFAULT_MODEL
 from shipgym.envs.registration import ENVIRONMENTS
 from shipgym.models.linear import is_course_stable
 
@@ -53,7 +52,7 @@ def test_every_environment_has_an_identified_model_by_default():
     Rudder-roll damping has a reference ship: trials in calm water show no roll damping.
     """
     models = [
-        shipgym.load_model(options.get("model", DEFAULT_MODEL))
+        shipgym.load_model(options.get("model", "mariner-tls-svm"))
         for name, options in ENVIRONMENTS.items()
         if name != "shipgym/RudderRoll-v0"
     ]

@@ -8,12 +8,17 @@ import numpy as np
 import pytest
 from certainty import PARTS, case
 
-from identification import IdentificationResult, Samples, Uncertainty, identify
-from identification.estimators.rm_svm import RMSVM
+from identification import (
+    RMSVM,
+    IdentificationResult,
+    Samples,
+    Uncertainty,
+    identify,
+    predict,
+)
 from identification.judging.closed_loop import closed_loop
 from identification.judging.model_error import with_sound_draws
 from identification.judging.warnings import held_out_error
-from identification.samples.prediction import predict
 from shipgym import ShipModel, Trial
 from shipgym.manoeuvres import zigzag, zigzag_indices
 

@@ -11,9 +11,8 @@ from identification import Uncertainty, identify
 from identification.judging.posterior import with_posterior
 from identification.judging.warnings import model_warnings
 from identification.models.sailed import CoefficientPrior
-from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
+from shipgym import InputError, Particulars, Sensors, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
-from shipgym.trials.sensors import Sensors
 
 
 @pytest.fixture(scope="module")

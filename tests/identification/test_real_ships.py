@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 from real_ships import Data
-from real_ships.captive import FORCES, combined, read, study
 from real_ships.marin import full_scale
 from real_ships.measures import mean_errors, turns, zigzag_errors
 from real_ships.mmg import CIRCLES, HSVA, OTHERS, circle, fitted
@@ -61,18 +60,3 @@ def test_the_mmg_form_of_three_zigzags_predicts_the_others_and_the_circle(
     )
     assert diameter == pytest.approx(CIRCLES[0][1], rel=0.04)
     assert drift == pytest.approx(CIRCLES[0][2], abs=1.5)
-
-
-@measured
-def test_captive_forces_reduce_to_few_terms_that_predict_drift_with_rudder() -> None:
-    tests = read(MEASURED_RUNS)
-    expected = {"X'": (0.98, 0.90), "Y'": (0.999, 0.998), "N'": (0.999, 0.999)}
-    for force in FORCES:
-        found = study(tests, force)
-        assert len(found.reduction.terms) <= 8
-        assert found.held_out["tls-svm, reduced"] > expected[force][0]
-        assert combined(tests, force, found.reduction.terms) > expected[force][1]
-    yaw = study(tests, "N'").reduction.coefficients
-    assert (
-        yaw["vn"] < 0.0 < yaw["dn"]
-    )  # Munk's moment; a rudder to starboard turns to starboard

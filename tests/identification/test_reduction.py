@@ -7,9 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from identification.design.reduction import (
-    backward_elimination,
-)
+from identification import backward_elimination
 from shipgym import (
     Particulars,
 )

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from identification.samples.prediction import predict, with_start
+from identification import predict
+from identification.samples.prediction import with_start
 from shipgym import Trial, load_model
 from shipgym.manoeuvres import turning_circle
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipgym.trials.units import DEGREE
+DEGREE = math.pi / 180.0
 
 SPEED, METRES = 7.0, 60.0 * 1852.0  # m/s, of a degree
 

@@ -11,7 +11,7 @@ import shipgym
 from shipgym.engine.episode_program import EpisodeProgram
 from shipgym.instruments.sensor_set import shipped_sensors
 from shipgym.sea.open_sea import CALM_SEA, OPEN_SEA
-from shipgym.tasks.definition import read_definition
+from shipgym.tasks import read_definition
 
 VECTOR = r"<\d+ x double>"  # as LLVM writes it
 TWICE = """

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 import shipgym
 from shipgym.engine.motion import Motion, Ship
-from shipgym.engine.random import DRAW, GOLDEN, mix
 from shipgym.ships import Envelope
+from shipgym.tasks import control_interval
 from shipgym.tasks.contract import Interval
-from shipgym.tasks.scales import OBSERVATION_NAMES, control_interval, observation_scales
+from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
 from shipgym.tasks.steering import Weights, integrated, steering_reward
 
 ID = "shipgym/CourseKeeping-v0"
@@ -230,12 +230,3 @@ def test_the_integral_gathers_small_errors_up_to_its_bound(integral, error):
     gathered = integral + (0.5 * error if abs(error) <= np.radians(10.0) else 0.0)
     found = integrated(integral, error, interval(), SHIP, Weights())
     assert found == pytest.approx(np.clip(gathered, -bound, bound))
-
-
-def test_random_numbers_are_those_of_splitmix64():
-    """The first three of the seed 0, as the authors' program gives them."""
-    with np.errstate(over="ignore"):
-        found = [int(mix(np.uint64(k) * GOLDEN)) for k in (1, 2, 3)]
-        words = [int(DRAW[k]) for k in (0, 1, 3)]
-    assert found == [0xE220A8397B1DCDAF, 0x6E789E6AA1B965F4, 0x06C45D188009454F]
-    assert words == [0, int(GOLDEN), 3 * int(GOLDEN) % 2**64]

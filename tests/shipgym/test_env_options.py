@@ -16,10 +16,8 @@ from shipgym import InputError
 from shipgym.envs.randomisation import N_SPEEDS, POOL_SIZE
 from shipgym.sea import Waves, Weather
 from shipgym.ships import Envelope
-from shipgym.tasks.definition import read_definition
-from shipgym.tasks.scales import rounded_interval
+from shipgym.tasks import course_keeping_task, read_definition
 from shipgym.tasks.steering import ROLL_SCALE
-from shipgym.tasks.task import RUDDER_ORDERS, course_keeping_task
 from shipgym.trials.sensors import SEA_TRIAL
 
 pytestmark = pytest.mark.interpreted
@@ -218,14 +216,14 @@ def test_frames_are_those_of_gymnasiums_wrapper():
 
 
 def test_discrete_orders_are_the_continuous_ones():
-    assert RUDDER_ORDERS == (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 1.0)
     discrete, continuous = make(action="rudder-discrete"), make()
-    assert discrete.action_space == gymnasium.spaces.Discrete(len(RUDDER_ORDERS))
+    assert discrete.action_space == gymnasium.spaces.Discrete(9)
     for env in (discrete, continuous):
         env.reset(seed=1)
-    for k in (0, 8, 3, 4, 5, 1, 7):
+    orders = {0: -1.0, 8: 1.0, 3: -0.1, 4: 0.0, 5: 0.1, 1: -0.5, 7: 0.5}
+    for k, order in orders.items():
         ours = discrete.step(k)
-        theirs = continuous.step(np.array([RUDDER_ORDERS[k]], dtype=np.float32))
+        theirs = continuous.step(np.array([order], dtype=np.float32))
         np.testing.assert_array_equal(ours[0], theirs[0])
         assert ours[1:] == theirs[1:]
 
@@ -364,23 +362,6 @@ def test_observations_have_the_bounds_of_their_page(name, page, count):
     assert len(found) == count
     assert {key: own[key] for key in found} == found
     assert own.keys() == found.keys() | documented("course_keeping").keys()
-
-
-@pytest.mark.parametrize(
-    ("travel_s", "interval"),
-    [
-        (28.2, 1.0),
-        (28.4, 2.0),
-        (400.0, 20.0),
-        (3.0, 0.2),
-        (0.5, 0.02),
-    ],
-)
-def test_a_control_interval_is_about_a_twentieth_of_the_time_a_length_takes(
-    travel_s, interval
-):
-    """As 1, 2 or 5 times a power of ten, by the nearest ratio."""
-    assert rounded_interval(travel_s) == pytest.approx(interval)
 
 
 def test_an_interval_is_at_most_five_ship_lengths():

@@ -13,7 +13,7 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics as VectorStatistic
 from stable_baselines3.common.monitor import Monitor
 
 from shipgym import InputError, ShipVecEnv, load_model
-from shipgym.envs.engine import Engine, episode_keys
+from shipgym.envs.engine import Engine
 from shipgym.tasks import course_keeping_task
 
 PATH, COURSE = "shipgym/PathFollowing-v0", "shipgym/CourseKeeping-v0"
@@ -268,13 +268,3 @@ def test_a_refused_action_leaves_what_was_shown():
     assert before[2].all()  # costs
     for array, now in zip(before, shown_by(engine), strict=True):
         np.testing.assert_array_equal(now, array)
-
-
-def test_seeds_are_those_of_gymnasiums_generators():
-    keys = episode_keys([[0, 1], [2, 0]])
-    assert keys.dtype == np.uint64
-    assert keys.shape == (2, 2)
-    assert keys[0, 0] == keys[1, 1]
-    first = int(np.random.Generator(np.random.PCG64(1)).integers(2**63))
-    assert keys[0, 1] == first
-    assert len(np.unique(keys)) == 3

@@ -6,9 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import shipgym
-from shipgym import ShipModel, manoeuvres
-from shipgym.models.catalogue import container, kvlcc2, kvlcc2_l7, tanker
+from shipgym import ShipModel, load_model, manoeuvres
 from tests.shipgym.reference import table
 
 
@@ -148,9 +146,9 @@ TANKER = [
 ]
 
 
-def weak(ship):
-    """The ship with 10 degrees of rudder at most."""
-    model = ship()
+def weak(name):
+    """A ship with 10 degrees of rudder at most."""
+    model = load_model(name)
     return replace(model, steering=replace(model.steering, rudder_limit_deg=10.0))
 
 
@@ -158,14 +156,14 @@ def weak(ship):
 def test_quoted_rows_of_the_container_ship(row):
     state, command, expected = container_row(*row)
     np.testing.assert_allclose(
-        weak(container).derivatives(state, command), expected, rtol=1e-10
+        weak("container").derivatives(state, command), expected, rtol=1e-10
     )
 
 
 @pytest.mark.parametrize("row", TANKER)
 def test_quoted_rows_of_the_tanker(row):
     state, command, expected, depth = tanker_row(*row)
-    rates = weak(tanker).derivatives(state, command, water_depth=depth)
+    rates = weak("tanker").derivatives(state, command, water_depth=depth)
     np.testing.assert_allclose(rates, expected, rtol=1e-10)
 
 
@@ -187,13 +185,13 @@ SHIP_STATE = (
     ("ship", "state", "n", "expected"),
     [
         (
-            kvlcc2_l7,
+            "kvlcc2-l7",
             MODEL_STATE,
             10.8532517036481,
             (-0.00742457323619287, -0.00861722011006149, 0.00448031124716304),
         ),
         (
-            kvlcc2,
+            "kvlcc2",
             SHIP_STATE,
             1.68450101953431,
             (0.0152436101539732, -0.00801784894791814, -0.000243699776273127),
@@ -201,7 +199,7 @@ SHIP_STATE = (
     ],
 )
 def test_quoted_rows_of_kvlcc2(ship, state, n, expected):
-    rates = ship().derivatives([0.0, 0.0, 0.0, *state], [state[-1], n])
+    rates = load_model(ship).derivatives([0.0, 0.0, 0.0, *state], [state[-1], n])
     np.testing.assert_allclose(rates[3:6], expected, rtol=1e-10)
 
 
@@ -209,20 +207,20 @@ def test_all_rows_of_the_container_ship():
     for row in table("container_derivatives.csv"):
         state, command, expected = container_row(*list(row)[1:23])
         np.testing.assert_allclose(
-            weak(container).derivatives(state, command), expected, rtol=1e-10
+            weak("container").derivatives(state, command), expected, rtol=1e-10
         )
 
 
 def test_all_rows_of_the_tanker():
     for row in table("tanker_derivatives.csv"):
         state, command, expected, depth = tanker_row(*list(row)[1:20])
-        rates = weak(tanker).derivatives(state, command, water_depth=depth)
+        rates = weak("tanker").derivatives(state, command, water_depth=depth)
         np.testing.assert_allclose(rates, expected, rtol=1e-10)
 
 
 def test_all_rows_of_kvlcc2():
     for row in table("kvlcc2_derivatives.csv"):
-        ship = kvlcc2 if row["is_full_scale"] else kvlcc2_l7
+        ship = load_model("kvlcc2" if row["is_full_scale"] else "kvlcc2-l7")
         state = [
             0.0,
             0.0,
@@ -232,7 +230,7 @@ def test_all_rows_of_kvlcc2():
             row["r_rad_s"],
             row["delta_rad"],
         ]
-        rates = ship().derivatives(state, [row["delta_rad"], row["n_rps"]])
+        rates = load_model(ship).derivatives(state, [row["delta_rad"], row["n_rps"]])
         names = ("u_m_s2", "v_m_s2", "r_rad_s2")
         expected = [row[f"paperform_dot_{name}"] for name in names]
         np.testing.assert_allclose(rates[3:6], expected, rtol=1e-10)
@@ -252,28 +250,33 @@ COLUMNS = {
 DEEP = 1e6  # m, the depth of the tanker's reference runs
 RUNS = {
     "container_turning_35": lambda: manoeuvres.turning_circle(
-        weak(container), 35, 1000
+        weak("container"), 35, 1000
     ),
     "container_zigzag_10_10": lambda: manoeuvres.zigzag(
-        weak(container), 10, 10, duration=800, switch="step"
+        weak("container"), 10, 10, duration=800, switch="step"
     ),
     "container_zigzag_20_20": lambda: manoeuvres.zigzag(
-        weak(container), 20, 20, duration=1000, switch="step"
+        weak("container"), 20, 20, duration=1000, switch="step"
     ),
     "tanker_turning_35": lambda: manoeuvres.turning_circle(
-        weak(tanker), 35, 1500, water_depth=DEEP
+        weak("tanker"), 35, 1500, water_depth=DEEP
     ),
     "tanker_zigzag_10_10": lambda: manoeuvres.zigzag(
-        weak(tanker), 10, 10, duration=1000, switch="step", water_depth=DEEP
+        weak("tanker"), 10, 10, duration=1000, switch="step", water_depth=DEEP
     ),
     "tanker_dmax35_zigzag_20_20": lambda: manoeuvres.zigzag(
-        tanker(), 20, 20, duration=1000, switch="step", water_depth=DEEP
+        load_model("tanker"),
+        20,
+        20,
+        duration=1000,
+        switch="step",
+        water_depth=DEEP,
     ),
     "kvlcc2_L7_paperform_turning_35": lambda: manoeuvres.turning_circle(
-        kvlcc2_l7(), 35, 200, 0.02
+        load_model("kvlcc2-l7"), 35, 200, 0.02
     ),
     "kvlcc2_L7_paperform_zigzag_20_20": lambda: manoeuvres.zigzag(
-        kvlcc2_l7(), 20, 20, duration=160, dt=0.02, switch="step"
+        load_model("kvlcc2-l7"), 20, 20, duration=160, dt=0.02, switch="step"
     ),
 }
 
@@ -294,10 +297,10 @@ def test_trajectories_are_the_reference_s(name):
 @pytest.mark.parametrize(
     ("model", "rudder", "duration", "advance", "tactical"),
     [
-        (container(), 35, 1000, 3.25, 4.09),
-        (tanker(), 35, 1500, 3.24, 3.13),
-        (kvlcc2_l7(), 35, 200, 3.08, 3.12),
-        (kvlcc2_l7(), -35, 200, 3.09, 3.10),
+        (load_model("container"), 35, 1000, 3.25, 4.09),
+        (load_model("tanker"), 35, 1500, 3.24, 3.13),
+        (load_model("kvlcc2-l7"), 35, 200, 3.08, 3.12),
+        (load_model("kvlcc2-l7"), -35, 200, 3.09, 3.10),
     ],
     ids=lambda value: value.name if isinstance(value, ShipModel) else None,
 )
@@ -313,7 +316,8 @@ def test_turning_circles(model, rudder, duration, advance, tactical):
 def test_the_tanker_turns_wider_in_shallow_water():
     """At 30 m, starting from 7.588 m/s: advance 3.12 L, tactical diameter 3.22 L."""
     slow = replace(
-        tanker(), particulars=replace(tanker().particulars, speed=7.588415331336)
+        load_model("tanker"),
+        particulars=replace(load_model("tanker").particulars, speed=7.588415331336),
     )
     shallow = manoeuvres.turning_indices(
         manoeuvres.turning_circle(slow, 35, 1500, water_depth=30.0)
@@ -324,7 +328,7 @@ def test_the_tanker_turns_wider_in_shallow_water():
 
 @pytest.mark.parametrize("name", ["container", "tanker", "kvlcc2", "kvlcc2-l7"])
 def test_the_service_state_is_steady_straight_running(name):
-    model = shipgym.load_model(name)
+    model = load_model(name)
     rates = dict(
         zip(
             model.state_names,
@@ -341,7 +345,7 @@ def test_the_service_state_is_steady_straight_running(name):
 
 @pytest.mark.parametrize("name", ["container", "kvlcc2"])
 def test_a_reference_ship_survives_its_file(name, tmp_path):
-    model = shipgym.load_model(name)
+    model = load_model(name)
     model.save(tmp_path / "model.json")
     again = ShipModel.load(tmp_path / "model.json")
     np.testing.assert_array_equal(

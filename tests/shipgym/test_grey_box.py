@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 
 import shipgym
-from shipgym import ShipModel
+from shipgym import ShipModel, register_structure, scale_model
 from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag
 from shipgym.models import converted_model, grey_box
-from shipgym.models.checker import check_ship_model
-from shipgym.models.scaling import scale_model
-from shipgym.ships.structures import get_structure, register_structure
+from shipgym.ships import get_structure
 
 pytestmark = pytest.mark.interpreted
 
@@ -101,17 +99,6 @@ def test_the_file_of_a_grey_box_holds_the_reference_ship(
     np.testing.assert_array_equal(again.ship_numbers(), model.ship_numbers())
     assert again.compiled is model.compiled
     assert again.table.to_dict() == model.table.to_dict()
-
-
-def test_a_table_may_have_other_terms_and_fewer_equations(
-    tanker: ShipModel, kvlcc2: ShipModel
-) -> None:
-    box = grey_box(tanker, {"r": "|v| r"})
-    model = converted_model(
-        box, kvlcc2.particulars, kvlcc2.steering, kvlcc2.service_shaft_speed
-    )
-    assert list(model.coefficients) == ["c_|v|r"]
-    assert check_ship_model(model).problems == ()
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipgym import InputError, load_model, manoeuvres
+from shipgym import load_model, manoeuvres
+from shipgym.manoeuvres import IndexInterval
 from shipgym.manoeuvres.imo import assess_draws
-from shipgym.manoeuvres.intervals import IndexInterval, intervals_of
+from shipgym.manoeuvres.intervals import intervals_of
 
 
 @pytest.fixture(scope="module")
@@ -88,17 +89,6 @@ def test_an_identified_ship_is_judged_with_intervals(identified):
     assert criteria["tactical_diameter"].share_passed == 0.0
 
 
-def test_wrong_arguments(identified):
-    with pytest.raises(InputError, match="expected a covariance"):
-        manoeuvres.index_intervals(load_model("mariner"))
-    with pytest.raises(InputError, match=r"manoeuvre: expected .*got 'zigzag 30/30'"):
-        manoeuvres.index_intervals(identified, "zigzag 30/30")
-    with pytest.raises(InputError, match=r"n_draws: expected .*got 1"):
-        manoeuvres.index_intervals(identified, n_draws=1)
-    with pytest.raises(InputError, match="expected a covariance"):
-        manoeuvres.imo_assessment(load_model("mariner"), n_draws=10)
-
-
 def index(value, values, ran_away=(), is_size=True):
     return IndexInterval(
         value,
@@ -106,29 +96,6 @@ def index(value, values, ran_away=(), is_size=True):
         np.isin(np.arange(len(values)), ran_away),
         is_size,
     )
-
-
-def test_an_interval_is_told_in_numbers_and_words():
-    """41 draws from 7 to 9, one that ran away and one that did not finish."""
-    values = [*np.linspace(7.0, 9.0, 41), np.nan, np.nan]
-    found = index(7.77777, values, ran_away=[41])
-    low, high = found.interval
-    assert (low, high) == (pytest.approx(7.0525), None)
-    assert found.quantiles(0.0, 0.5, 1.0) == (7.0, pytest.approx(8.05), None)
-    assert (found.n_ran_away, found.n_never_reached) == (1, 1)
-    assert str(found) == (
-        "7.778 [7.053, no upper bound]"
-        " (1 of 43 draws ran away, 1 of 43 draws did not finish)"
-    )
-    assert found.to_dict() == {
-        "value": 7.77777,
-        "interval_95": found.interval,
-        "draws": 43,
-        "ran_away": 1,
-        "never_reached": 1,
-    }
-    assert str(index(None, [])) == "-"
-    assert str(index(2.0, [1.0, 3.0])).startswith("2 [1.05, 2.95]")
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,6 @@ from shipgym.models.linear import (
     is_course_stable,
     linearise,
     nomoto,
-    nomoto_of,
-    steering_state_space,
     straight_running,
 )
 
@@ -144,9 +142,3 @@ def test_a_model_without_straight_course_is_refused_by_name():
         match=r"model 'mariner': expected a straight course with less than 20 deg",
     ):
         straight_running(with_coefficients(N_0=0.01))
-
-
-def test_a_rudder_without_effect_has_no_nomoto_form():
-    A, _ = steering_state_space(MARINER)
-    with pytest.raises(InputError, match="whose rudder has a steady effect"):
-        nomoto_of(A, np.zeros((2, 1)))

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from agents.cli import app
-from shipgym import InputError, load_model, manoeuvres
+from shipgym import load_model, manoeuvres
 from shipgym.manoeuvres.standard import FAMILIES
 
 PARALLEL_SHIFT = '''
@@ -82,17 +82,6 @@ def test_a_manoeuvre_from_a_folder_of_ones_own_is_sailed_and_reported(shifts, tm
     assert low < found["shift_lengths"]["value"] < high
     assert "Parallel courses" in page.read_text()
     assert "Heading and rudder in degrees." in page.read_text()
-
-
-def test_its_indices_have_intervals(shifts):
-    model = load_model("mariner-tls-svm")
-    found = manoeuvres.index_intervals(model, "parallel shift to starboard", n_draws=4)
-    assert found["heading_change_deg"].interval is not None
-
-
-def test_a_name_is_registered_once(shifts):
-    with pytest.raises(InputError, match="'zigzags', which is registered already"):
-        manoeuvres.register_manoeuvre("zigzags", shifts.variants)
 
 
 def test_the_documentation_names_every_manoeuvre():

@@ -112,37 +112,6 @@ def test_a_zigzag_that_never_reaches_its_heading_says_so_with_its_trial(mariner)
     )
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda m: manoeuvres.zigzag(m, -20), "rudder_deg: expected .*got -20"),
-        (
-            lambda m: manoeuvres.zigzag(m, 20, 20, duration=0),
-            "duration: expected .*got 0",
-        ),
-        (
-            lambda m: manoeuvres.zigzag(m, 20, 20, dt=float("nan")),
-            "dt: expected .*got nan",
-        ),
-        (
-            lambda m: manoeuvres.zigzag(m, 20, 20, switch="later"),
-            "switch: expected .*got 'later'",
-        ),
-        (
-            lambda m: manoeuvres.turning_circle(m, 0.0),
-            "expected an angle that turns the ship",
-        ),
-        (
-            lambda m: manoeuvres.turning_circle(m, 120.0),
-            "rudder_deg: expected .*got 120",
-        ),
-    ],
-)
-def test_wrong_arguments(mariner, call, message):
-    with pytest.raises(InputError, match=message):
-        call(mariner)
-
-
 def test_what_a_trial_lacks_is_named():
     trial = Trial([0, 1, 2], {"psi": [0, 0, 0.0]})
     with pytest.raises(InputError, match="'delta' is missing"):

@@ -9,7 +9,6 @@ from shipgym.engine.mathematics import (
     arctan2,
     exponential,
     sin_cos,
-    wrap,
 )
 
 
@@ -57,10 +56,3 @@ def test_sine_and_cosine_to_the_last_digits():
     found = np.array([sin_cos(angle) for angle in angles])
     expected = np.stack([np.sin(angles), np.cos(angles)], axis=1)
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=5e-15)
-
-
-def test_wrapped_angles_are_the_same_direction():
-    angles = np.linspace(-30.0, 30.0, 997)
-    wrapped = np.array([wrap(angle) for angle in angles])
-    assert np.all((wrapped >= -np.pi) & (wrapped < np.pi))
-    np.testing.assert_allclose(np.exp(1j * wrapped), np.exp(1j * angles), atol=1e-12)

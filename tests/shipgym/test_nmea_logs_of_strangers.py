@@ -10,9 +10,8 @@ from functools import reduce
 import numpy as np
 import pytest
 
-from shipgym import InputError
+from shipgym import InputError, Trial
 from shipgym.trials.guesses import guess_trial
-from shipgym.trials.trial import Trial
 from shipgym.trials.units import DEGREE, KNOT
 from tests.shipgym.one_zigzag import SPEED, sailed
 

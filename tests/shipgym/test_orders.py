@@ -2,8 +2,6 @@
 shaft.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -84,31 +82,6 @@ def test_a_ship_that_capsizes_is_an_error_even_if_nothing_else_feels_her_roll():
     with pytest.raises(UnstableModelError, match="phi = ") as error:
         manoeuvres.turning_circle(ship, 20.0)
     assert abs(error.value.state["phi"]) < np.pi / 2
-
-
-@pytest.mark.compiled
-def test_a_step_that_is_far_too_long_is_suspected_and_a_shorter_one_named():
-    with pytest.raises(UnstableModelError, match="or steps of 100 s are too long: try"):
-        manoeuvres.zigzag(load_model("mariner"), dt=100.0)
-
-
-@pytest.mark.parametrize(
-    "sail",
-    [
-        manoeuvres.zigzag,
-        manoeuvres.turning_circle,
-    ],
-)
-def test_a_ship_that_blows_up_is_an_error_with_time_and_state(sail):
-    ship = load_model("mariner")
-    wild = replace(
-        ship, coefficients=ship.coefficients | {"N_r": 5e-3}
-    )  # yaw that feeds itself
-    with pytest.raises(UnstableModelError, match=r"runs away after .* s") as error:
-        sail(wild)
-    assert error.value.time_s > 0.0
-    assert set(error.value.state) == set(ship.state_names)
-    assert all(np.isfinite(value) for value in error.value.state.values())
 
 
 def test_the_shaft_is_part_of_the_record_of_a_ship_without_shaft_lag():

@@ -6,15 +6,10 @@ from dataclasses import replace
 
 import pytest
 
+from shipgym import Particulars
 from shipgym.errors import InputError
-from shipgym.ships.particulars import (
-    ADDED_MASSES,
-    NAMES,
-    Particulars,
-    clarke_added_masses,
-)
+from shipgym.ships.particulars import clarke_added_masses
 
-MARINER = {"length": 160.93, "beam": 23.17, "draught": 8.23, "speed": 7.7175}
 KVLCC2 = {
     "length": 7.0,
     "beam": 1.2688,
@@ -65,22 +60,6 @@ def test_what_is_given_is_kept_and_what_is_estimated_is_marked():
     assert completed.completed() == completed
 
 
-def test_mass_and_inertia_are_estimated_from_the_block_coefficient():
-    ship = Particulars(
-        length=100.0, beam=16.0, draught=6.0, block_coefficient=0.7
-    ).completed()
-    assert ship.water_density == 1025.0
-    assert ship.mass == pytest.approx(1025.0 * 100.0 * 16.0 * 6.0 * 0.7)
-    assert (ship.xg, ship.yaw_gyradius) == (0.0, 25.0)
-    assert ship.estimated == {
-        "water_density",
-        "mass",
-        "xg",
-        "yaw_gyradius",
-        *ADDED_MASSES,
-    }
-
-
 def test_what_cannot_be_estimated_is_named_with_the_ways_out():
     with pytest.raises(
         InputError,
@@ -107,8 +86,6 @@ def test_what_cannot_be_estimated_is_named_with_the_ways_out():
 def test_particulars_are_a_mapping_and_go_through_json():
     ship = Particulars.from_mapping(KVLCC2 | {"name": "KVLCC2"}).completed()
     assert ship["length"] == ship.length == 7.0
-    assert tuple(ship) == NAMES
-    assert len(ship) == len(NAMES)
     assert Particulars.from_mapping(json.loads(json.dumps(ship.to_dict()))) == ship
     with pytest.raises(KeyError):
         ship["estimated"]
@@ -163,13 +140,3 @@ def test_what_no_ship_has_is_refused(values, message):
         Particulars.from_mapping(KVLCC2 | values, "ship.toml: [ship]")
     assert str(caught.value).startswith("ship.toml: [ship]")
     assert message in str(caught.value)
-
-
-def test_a_mass_is_not_held_against_a_block_coefficient_that_was_guessed():
-    slender = {"length": 100.0, "beam": 12.0, "draught": 4.0, "mass": 1.6e6}
-    guessed = Particulars(
-        **slender, block_coefficient=0.9, estimated={"block_coefficient"}
-    )
-    assert guessed.mass == 1.6e6
-    with pytest.raises(InputError, match="half to twice what block_coefficient gives"):
-        Particulars(**slender, block_coefficient=0.9)

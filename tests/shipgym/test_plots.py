@@ -9,13 +9,13 @@ from shipgym.manoeuvres import (
     zigzag,
 )
 from shipgym.plots import (
+    CHANNEL_AXES,
     history_figure,
     manoeuvre_figure,
     path_figure,
     turning_figure,
     zigzag_figure,
 )
-from shipgym.plots.trials import CHANNEL_AXES
 
 DERIVED = ("speed", "drift")  # channels that u and v give
 

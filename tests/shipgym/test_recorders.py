@@ -6,9 +6,9 @@ import io
 import numpy as np
 import pytest
 
+from shipgym import ShipFile
 from shipgym.errors import InputError
 from shipgym.trials.guesses import guess_trial
-from shipgym.trials.ship_file import ShipFile
 from tests.shipgym.one_zigzag import sailed
 
 SHIP = list(sailed(240))

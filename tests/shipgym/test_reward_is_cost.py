@@ -12,9 +12,10 @@ import pytest
 from scipy.stats import spearmanr
 
 from shipgym.envs.registration import ENVIRONMENTS
-from shipgym.tasks.task import RUDDER_ORDERS
 
 EPISODES = 10
+#: Of `rudder-discrete`, by the rudder limit.
+RUDDER_ORDERS = np.array([-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 1.0])
 FIRST_SEED = 1000
 
 
@@ -66,7 +67,7 @@ def rudders(controllers, step, seen):
 def as_actions(orders, space):
     """Actions of rudder orders; the shaft stays at service speed."""
     if isinstance(space, gymnasium.spaces.Discrete):
-        return np.abs(orders[:, None] - np.array(RUDDER_ORDERS)).argmin(axis=1)
+        return np.abs(orders[:, None] - RUDDER_ORDERS).argmin(axis=1)
     actions = np.ones((len(orders), *space.shape), np.float32)
     actions[:, 0] = orders
     return actions

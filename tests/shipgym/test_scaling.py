@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import shipgym
-from shipgym import InputError, Particulars, ShipModel, SteeringGear, scale_model
+from shipgym import Particulars, ShipModel, SteeringGear, scale_model
 from shipgym.manoeuvres import zigzag, zigzag_indices
-from shipgym.ships import Envelope
-from shipgym.ships.structures import get_structure
+from shipgym.ships import Envelope, get_structure
 
 pytestmark = pytest.mark.interpreted
 
@@ -74,20 +72,3 @@ def test_there_and_back_is_the_ship_itself():
         for s in (ship, model)
     ]
     np.testing.assert_allclose(*deviations, rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("name", "arguments", "message"),
-    [
-        ("mariner", {"length": -3.0}, r"length: expected a number > 0 \(in m\)"),
-        ("mariner", {"length": 3.0, "speed": 0.0}, "speed: expected"),
-        (
-            "container",
-            {"length": 3.0},
-            "got the equations of reference ship 'container'",
-        ),
-    ],
-)
-def test_what_cannot_be_scaled_is_refused(name, arguments, message):
-    with pytest.raises(InputError, match=message):
-        scale_model(shipgym.load_model(name), **arguments)

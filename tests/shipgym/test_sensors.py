@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from shipgym import InputError, Trial, load_model, manoeuvres
-from shipgym.trials.sensors import SEA_TRIAL, Sensor, Sensors
+from shipgym import InputError, Sensor, Sensors, Trial, load_model, manoeuvres
+from shipgym.trials.sensors import SEA_TRIAL
 
 N = 40_000
 

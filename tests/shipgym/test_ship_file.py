@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shipgym import ShipFile, SteeringGear
 from shipgym.errors import InputError
-from shipgym.ships.steering import SteeringGear
-from shipgym.trials.ship_file import ShipFile
 
 SHIPS = Path(__file__).parents[1] / "ships"
 DATA = Path(__file__).parents[2].parent / "shared" / "data"

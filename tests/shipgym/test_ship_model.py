@@ -170,11 +170,6 @@ def test_binary_and_missing_files_are_refused(tmp_path):
         shipgym.load_model(tmp_path / "other.json")
 
 
-def test_a_name_that_is_nearly_right(tmp_path):
-    with pytest.raises(InputError, match="Did you mean 'mariner'"):
-        shipgym.load_model("marinner")
-
-
 @settings(max_examples=30, deadline=None)
 @given(st.floats(0.0, 2 * np.pi), st.floats(0.2, 3.0), st.floats(0.01, 1.0))
 def test_an_ellipsoid_holds_its_samples(angle, stretch, spread):

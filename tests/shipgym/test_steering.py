@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipgym import load_model
+from shipgym import SteeringGear, load_model
 from shipgym.errors import InputError
-from shipgym.ships.steering import SteeringGear
 
 
 def test_limit_and_rate_are_in_radians():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shipgym import InputError, ManoeuvreError, Trial, load_model
+from shipgym import ManoeuvreError, Trial, load_model
 from shipgym.manoeuvres import stopping, stopping_indices
 
 FULL_ASTERN = -80.0 / 60.0  # 1/s
@@ -37,15 +37,6 @@ def test_a_container_ship_without_thrust_halves_its_speed_in_13_lengths():
     assert eighth - quarter == pytest.approx(halving, abs=1 / 40)  # a step
 
 
-@pytest.mark.parametrize("name", ["container", "kvlcc2"])
-def test_coasting_straight_needs_no_sideways_room(name):
-    indices = stopping_indices(stopping(load_model(name)))
-    assert indices.side_reach_lengths == pytest.approx(0.0, abs=1e-9)
-    assert indices.head_reach_lengths == pytest.approx(
-        indices.track_reach_lengths, rel=1e-5
-    )
-
-
 def test_stopping_distance_of_a_stop_drawn_by_hand():
     """From 10 m/s at 0.1 m/s2 to the east.
 
@@ -75,40 +66,3 @@ def test_a_ship_that_does_not_stop_says_so_with_its_trial():
     ) as error:
         stopping(tanker, speed_ratio=0.01)
     assert 0.0823 < error.value.trial["u"][-1] < 0.5
-
-
-@pytest.mark.parametrize(
-    ("name", "call", "message"),
-    [
-        (
-            "container",
-            lambda m: stopping(m, -0.5),
-            "'container' holds for a shaft turning ahead only",
-        ),
-        (
-            "kvlcc2",
-            lambda m: stopping(m, -0.5),
-            "'kvlcc2' holds for a shaft turning ahead only",
-        ),
-        ("tanker", lambda m: stopping(m, 5.0), "shaft_speed: expected .*got 5"),
-        ("tanker", lambda m: stopping(m, speed_ratio=0.0), "never dead in the water"),
-        (
-            "tanker",
-            lambda m: stopping(m, speed_ratio=1.5),
-            "speed_ratio: expected .*got 1.5",
-        ),
-        (
-            "mariner",
-            stopping,
-            "'mariner': expected one that is ordered a shaft speed",
-        ),
-        (
-            "tanker",
-            lambda m: stopping_indices(Trial([0, 1, 2], {"u": [1, 1, 1.0]})),
-            "channel 'v' is missing",
-        ),
-    ],
-)
-def test_wrong_arguments(name, call, message):
-    with pytest.raises(InputError, match=message):
-        call(load_model(name))

@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 
 import shipgym
-from shipgym import InputError, Particulars, ShipModel, SteeringGear
+from shipgym import InputError, Particulars, ShipModel, SteeringGear, list_structures
 from shipgym.engine.motion import Motion, Ship
-from shipgym.ships import structures
-from shipgym.ships.structures import get_structure, list_structures
-from shipgym.ships.term_table import Structure
-from shipgym.ships.terms import Term
+from shipgym.ships import Structure, Term, get_structure, structures
 
 pytestmark = pytest.mark.interpreted
 
@@ -137,22 +134,6 @@ def test_surge_reaches_the_speed_at_which_thrust_meets_resistance():
     np.testing.assert_array_equal(ahead["psi"], 0.0)
 
 
-def test_cubic_at_service_is_in_parts_of_service():
-    """udot L / U0^2 is the sum of the coefficients of n2, nu, u2 at service speed and
-    revolutions.
-    """
-    ship = virtual_ship(
-        "cubic", a_n2=0.03, a_nu=-0.01, a_u2=-0.005, b_Uv=-0.4, **{"c_v3/U": 2.0}
-    )
-    udot = ship.derivatives(ship.service_state, ship.service_command)[3]
-    assert udot * 160.93 / 7.7175**2 == pytest.approx(0.015)
-    U0, v = 7.7175, 0.1 * 7.7175
-    state = [0.0, 0.0, 0.0, np.sqrt(U0**2 - v**2), v, 0.0, 0.0]
-    vdot, rdot = ship.derivatives(state, ship.service_command)[4:6]
-    assert vdot * 160.93 / U0**2 == pytest.approx(-0.4 * 0.1)
-    assert rdot * 160.93**2 / U0**2 == pytest.approx(2.0 * 0.1**3)
-
-
 def test_a_table_is_registered_in_a_line_and_saved_with_its_models(
     tmp_path, monkeypatch
 ):
@@ -208,15 +189,6 @@ def test_a_table_is_registered_in_a_line_and_saved_with_its_models(
 def test_a_table_that_cannot_be_is_refused(equations, others, message):
     with pytest.raises(InputError, match=message):
         shipgym.register_structure(**{"name": "mine", "equations": equations} | others)
-
-
-def test_a_shaft_speed_is_asked_for_where_the_terms_have_one():
-    with pytest.raises(InputError, match=r"service_shaft_speed of 'virtual': .* got 0"):
-        replace(virtual_ship("cubic"), service_shaft_speed=0.0)
-    with pytest.raises(InputError, match=r"service_shaft_speed: .* got 0"):
-        get_structure("surge-perturbed").acceleration_matrix(
-            Particulars(length=100.0, speed=5.0)
-        )
 
 
 def test_a_table_of_unknown_symbols_becomes_no_program():

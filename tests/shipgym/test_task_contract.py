@@ -5,10 +5,7 @@ import numpy as np
 import pytest
 
 from shipgym import InputError, register_task
-from shipgym.engine.records import leaves, short_names
 from shipgym.engine.specialise import is_shipped
-from shipgym.tasks.contract import Random, drawn, drawn_normal, under_way
-from shipgym.tasks.definition import read_definition
 
 COURSE = "shipgym/CourseKeeping-v0"
 TASK = """
@@ -241,25 +238,3 @@ def test_what_a_task_may_not_hold_is_named_with_file_and_line(
     with pytest.raises(InputError, match=rf"wrong.py{place}.* {message}"):
         register_task("harbour/Wrong-v0", path)
     assert "harbour/Wrong-v0" not in gymnasium.registry
-
-
-def test_names_are_prefixed_where_a_record_occurs_twice(task):
-    definition = read_definition(task)
-    assert tuple(short_names(definition.Observation).values()) == NAMES
-    assert leaves(definition.State)[:3] == ("targets.0.x", "targets.0.y", "targets.1.x")
-    own = read_definition("CourseKeeping")
-    names = short_names(own.Observation)
-    assert set(names.values()) == {path.rpartition(".")[2] for path in names}
-
-
-def test_random_numbers_are_a_function_of_key_episode_and_number():
-    random = Random(np.uint64(3), np.uint64(4))
-    with np.errstate(over="ignore"):
-        normal = [drawn_normal(random, k) for k in range(4000)]
-        again = [drawn_normal(random, k) for k in range(10)]
-        uniform = [drawn(random, k, -1.0, 1.0) for k in range(4000)]
-    assert again == normal[:10]
-    assert np.mean(normal) == pytest.approx(0.0, abs=0.05)
-    assert np.std(normal) == pytest.approx(1.0, abs=0.05)
-    assert abs(np.corrcoef(normal, uniform)[0, 1]) < 0.05
-    assert under_way(1.0, 2.0, 0.5, 3.0, 1.5)[:4] == (1.0, 2.0, 0.5, 3.0)

@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import cumulative_trapezoid
 
+from shipgym import Trial
 from shipgym.errors import InputError
-from shipgym.trials.trial import Trial
 
 T = np.linspace(0.0, 60.0, 301)
 

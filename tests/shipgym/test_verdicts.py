@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipgym import InputError, UnstableModelError, load_model
+from shipgym import InputError, Sensors, UnstableModelError, load_model
 from shipgym.manoeuvres import (
+    IndexInterval,
     imo_assessment,
     standard_manoeuvres,
     turning_circle,
@@ -21,14 +22,12 @@ from shipgym.manoeuvres.criteria import (
     with_measured,
 )
 from shipgym.manoeuvres.imo_rules import RULES
-from shipgym.manoeuvres.intervals import IndexInterval
 from shipgym.manoeuvres.measured import (
     MeasuredIndex,
     measured_by,
     measured_in_file,
     measured_indices,
 )
-from shipgym.trials.sensors import Sensors
 
 
 @pytest.fixture(scope="module")

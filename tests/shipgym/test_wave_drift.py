@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 
 from shipgym import InputError, Particulars, Waves, load_model
 from shipgym.constants import GRAVITY
-from shipgym.sea import wave_drift, wave_motion
+from shipgym.sea import wave_drift, wave_motion, weather_particulars
 from shipgym.sea.added_resistance import added_resistance
 from shipgym.sea.drift import reflection_coefficients
-from shipgym.sea.estimates import weather_particulars
 from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.waves import draught_attenuation, slow_drift, wave_spectrum
 from shipgym.ships import get_structure

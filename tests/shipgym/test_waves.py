@@ -9,10 +9,10 @@ from shipgym import Particulars, Waves, load_model
 from shipgym.constants import GRAVITY
 from shipgym.sea import (
     jonswap,
+    wave_drift,
     wave_motion,
+    weather_particulars,
 )
-from shipgym.sea.drift import wave_drift
-from shipgym.sea.estimates import weather_particulars
 from shipgym.sea.motions import effective_wave_slope, heading_response
 from shipgym.sea.waves import pierson_moskowitz, wave_filter
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import shipgym
-from shipgym import InputError
+from shipgym import InputError, Sensors
 from shipgym.envs.engine import Engine
-from shipgym.models.simulate import simulate
 from shipgym.sea import (
     AIR_DENSITY,
     Current,
@@ -20,8 +19,7 @@ from shipgym.sea import (
 )
 from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.wind import gust_filter
-from shipgym.tasks.task import course_keeping_task
-from shipgym.trials.sensors import Sensors
+from shipgym.tasks import course_keeping_task
 
 GALE = Weather(
     current=Current(1.0, 90.0, 0.2, 300.0),
@@ -38,9 +36,8 @@ def mariner():
 
 
 def ahead(model, weather=None, steps=1200, dt=0.5, seed=0, state=None, rudder=0.0):
-    return simulate(
-        model, np.full((steps, 1), rudder), dt, state, weather=weather, seed=seed
-    )
+    orders = np.full((steps, 1), rudder)
+    return model.simulate(orders, dt, state, weather=weather, seed=seed)
 
 
 def inert(model, speed=1e-9):

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from shipgym import InputError, Particulars, Wind, load_model
-from shipgym.sea import wind_curves
-from shipgym.sea.estimates import weather_particulars
+from shipgym.sea import weather_particulars, wind_curves
 from shipgym.sea.wind import gust_filter
 from shipgym.sea.wind_coefficients import (
     coefficient_names,

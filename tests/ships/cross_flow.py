@@ -21,13 +21,11 @@ from dataclasses import replace
 from math import fabs, pi, sqrt
 from typing import Any
 
-from shipgym import ShipModel
+from shipgym import Particulars, ShipEquations, ShipModel, SteeringGear
 from shipgym.engine.mathematics import arctan2, sin_cos
 from shipgym.engine.motion import Motion, Ship
 from shipgym.models.catalogue import model_of
-from shipgym.ships.equations import ShipEquations, record_of
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.steering import SteeringGear
+from shipgym.ships.equations import record_of
 from tests.ships.clarke import clarke_derivatives
 
 DENSITY, HALF = 1025.0, 0.5 * 1025.0  # kg/m^3

@@ -14,10 +14,9 @@ from __future__ import annotations
 from math import fabs, pi, sqrt
 from typing import Any
 
+from shipgym import Particulars, ShipEquations, SteeringGear
 from shipgym.engine.motion import Motion, Ship
-from shipgym.ships.equations import ShipEquations, record_of
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.steering import SteeringGear
+from shipgym.ships.equations import record_of
 from tests.ships.clarke import clarke_derivatives
 from tests.ships.cross_flow import K_T_J, cross_flow, known, rudder_force
 

@@ -14,8 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shipgym import ShipModel, load_model
-from shipgym.ships.particulars import Particulars
+from shipgym import Particulars, ShipModel, load_model
 
 #: Training ship of 105 m, tested as a model of 1:24.5; numbers as collected at
 #: github.com/nikpau/mmgdynamics.

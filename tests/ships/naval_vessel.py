@@ -16,10 +16,8 @@ diameter are ours. All in SI units.
 from math import degrees, fabs, pi
 from typing import NamedTuple
 
+from shipgym import Particulars, ShipEquations, SteeringGear
 from shipgym.engine.motion import Motion, Ship
-from shipgym.ships.equations import ShipEquations
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.steering import SteeringGear
 
 DENSITY, GRAVITY = 1014.0, 9.81
 LENGTH, VOLUME, SPEED = 51.5, 357.0, 8.0  # m, m^3, m/s
