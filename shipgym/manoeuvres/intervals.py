@@ -79,12 +79,12 @@ class IndexInterval:
             sizes[without] = np.inf
             return quantiles(sizes, *levels)
 
+        # what did not finish lies below low levels and above high ones, and does not
+        # count in the median
         found: list[float | None] = []
         for level in levels:
-            values = self.values.copy()
-            values[without] = np.copysign(np.inf, level - 0.5)
-            if level == 0.5:
-                values = self.values[~without]
+            values = self.values[~without] if level == 0.5 else self.values.copy()
+            values[np.isnan(values)] = np.copysign(np.inf, level - 0.5)
             found += quantiles(values, level)
         return tuple(found)
 

@@ -95,31 +95,12 @@ def stopping(
 def stopping_order(model: ShipModel, shaft_speed: float, speed_ratio: float) -> float:
     """The order for the shaft, 1/s, after checking it and the ratio of speeds."""
     service = shaft_of(model)
+    least = -1.5 * service if goes_astern(model) else 0.0
+    hint = "less than at service speed, and astern only where her equations hold there"
     order = check_number(
-        shaft_speed,
-        "shaft_speed",
-        at_least=-1.5 * service,
-        below=service,
-        hint="less than at service speed",
+        shaft_speed, "shaft_speed", at_least=least, below=service, hint=hint
     )
-    if order < 0.0 and not goes_astern(model):
-        raise InputError(
-            f"shaft_speed: expected a number >= 0, got {order:g} 1/s; the propeller of"
-            f" {model.name!r} holds for a shaft turning ahead only: choose a ship like"
-            " 'tanker'"
-        )
-    check_number(
-        speed_ratio,
-        "speed_ratio",
-        at_least=0.0,
-        below=1.0,
-        hint="part of the service speed",
-    )
-    if speed_ratio == 0.0 and order >= 0.0:
-        raise InputError(
-            "speed_ratio: expected a number > 0, such as 0.1, got 0; a ship without an"
-            " order astern is never dead in the water"
-        )
+    check_number(speed_ratio, "speed_ratio", at_least=0.0, below=1.0)
     return order
 
 

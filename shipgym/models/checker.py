@@ -65,7 +65,6 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
         problems += _wrong_courses(model)
         problems += _wrong_rudder(model)
         remarks += _unusual(model, asymmetry)
-    problems += _wrong_covariance(model)
     return ModelCheck(
         name,
         tuple(problems),
@@ -146,18 +145,12 @@ def _asymmetry(model: ShipModel) -> float:
     ours = _accelerations(model, channels)
     image = sign * _accelerations(model, mirrored)
 
-    # units of the prime system, but for what all have
     length = model.particulars["length"]
-    units = dict.fromkeys(rates, 1.0)
-    units |= dict.fromkeys(ANGULAR, length)
-    units["q"] = length * model.travel_time
-    unit = [units[name] for name in rates]
-
+    units = dict.fromkeys(ANGULAR, length) | {"q": length * model.travel_time}
+    unit = [units.get(name, 1.0) for name in rates]  # prime, but for what all have
     size = _root_mean_square(ours * unit)
     difference = _root_mean_square((ours - image) * unit)
-    if size == 0.0:
-        return 0.0
-    return difference / (2.0 * size)
+    return 0.0 if size == 0.0 else difference / (2.0 * size)
 
 
 def _root_mean_square(values: Floats) -> float:
@@ -252,18 +245,4 @@ def _unusual(model: ShipModel, asymmetry: float) -> Iterator[str]:
             "straight ahead with the rudder amidships its speed becomes"
             f" {100.0 * kept:.0f} % of service speed: look at the terms of surge, the"
             " service speed and the shaft speed"
-        )
-
-
-def _wrong_covariance(model: ShipModel) -> Iterator[str]:
-    if model.covariance is None:
-        return
-    deviations = np.sqrt(np.maximum(np.diag(model.covariance), 0.0))
-    scale = np.where(deviations > 0.0, deviations, 1.0)
-    correlations = model.covariance / np.outer(scale, scale)
-    least = float(np.linalg.eigvalsh(correlations).min())
-    if not least > -1e-6:
-        yield (
-            "covariance: expected no eigenvalue of the correlations below 0, got"
-            f" {least:.2g}"
         )

@@ -15,6 +15,7 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_array, check_table, unexpected
 
 ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
+SHAPES = {"low": (4,), "high": (4,), "centre": (4,), "shape": (4, 4)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,36 +64,21 @@ class Envelope:
 
     def to_dict(self) -> dict[str, Any]:
         """Envelope as written in a model file."""
-        return {
-            "channels": list(ENVELOPE_CHANNELS),
-            "low": self.low.tolist(),
-            "high": self.high.tolist(),
-            "centre": self.centre.tolist(),
-            "shape": self.shape.tolist(),
-        }
+        arrays = {name: getattr(self, name).tolist() for name in SHAPES}
+        return {"channels": list(ENVELOPE_CHANNELS), **arrays}
 
     @classmethod
     def from_dict(cls, content: Any, where: str) -> Self:
         """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
-        shapes = {
-            "low": (4,),
-            "high": (4,),
-            "centre": (4,),
-            "shape": (4, 4),
-        }
-        table = check_table(
-            content,
-            where,
-            allowed=("channels", *shapes),
-        )
-        names = table.get("channels")
+        table = check_table(content, where, allowed=("channels", *SHAPES))
         expected = list(ENVELOPE_CHANNELS)
-        if names != expected:
-            raise unexpected(f"{where}.channels", str(expected), names)
-        arrays = {}
-        for name, shape in shapes.items():
-            numbers = table.get(name)
-            arrays[name] = check_array(numbers, shape, f"{where}.{name}")
+        if table.get("channels") != expected:
+            found = table.get("channels")
+            raise unexpected(f"{where}.channels", str(expected), found)
+        arrays = {
+            name: check_array(table.get(name), shape, f"{where}.{name}")
+            for name, shape in SHAPES.items()
+        }
         return cls(**arrays)
 
 

@@ -71,15 +71,11 @@ def _mmg(model: ManoeuvringModel) -> Floats:
     L = p.length
     unit = 0.5 * p.require("water_density") * L**2 * p.require("draught")
     m, m_xG, I_z = rigid_inertia(model)
-    surge = m + c["mx"] * unit
-    sway = m + c["my"] * unit
-    yaw = I_z + c["Jz"] * unit * L**2
-    rows = [
-        [surge, 0.0, 0.0, 0.0],
-        [0.0, sway, m_xG, 0.0],
-        [0.0, m_xG, yaw, 0.0],
-    ]
-    return np.array(rows)
+    added = np.array([c["mx"], c["my"], c["Jz"] * L**2])
+    total = np.eye(3, 4)
+    total[range(3), range(3)] = np.array([m, m, I_z]) + unit * added
+    total[1, 2] = total[2, 1] = m_xG
+    return total
 
 
 def _tanker(model: ManoeuvringModel, water_depth: float) -> Floats:
@@ -91,10 +87,5 @@ def _tanker(model: ManoeuvringModel, water_depth: float) -> Floats:
     surge = c["m11"] - c["X_udotz"] * z
     sway = c["m22"] - c["Y_vdotz"] * z
     yaw = (c["m33"] - c["N_rdotz"] * z) * p["length"] ** 2
-    rows = [
-        [surge, 0.0, 0.0, 0.0],
-        [0.0, sway, 0.0, 0.0],
-        [0.0, 0.0, yaw, 0.0],
-    ]
-    mass = float(p["mass"])
-    return mass * np.array(rows)
+    diagonal = np.array([surge, sway, yaw])
+    return float(p["mass"]) * diagonal[:, None] * np.eye(3, 4)

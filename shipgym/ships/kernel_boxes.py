@@ -33,6 +33,13 @@ from shipgym.ships.terms import Term
 
 RBF = "rbf"
 SIZES = (32, 64, 100)  # centres of what is compiled; others have weight 0
+#: Arrays of a kernel; None: the number of centres, of features.
+SHAPES: dict[str, tuple[int | None, ...]] = {
+    "offset": (4,),
+    "scale": (4,),
+    "centres": (None, 4),
+    "basis": (None, None),
+}
 SLOWEST = 0.05  # of service speed; slower, v and r are divided by it
 # numbers of a centre in the table: 4 coordinates, minus half the square of their
 # distance from the origin, 3 weights
@@ -66,23 +73,14 @@ class Kernel:
     basis: Floats  # of the features in the functions, shape (n_centres, n_features)
 
     def __post_init__(self) -> None:
-        arrays = (self.offset, self.scale, self.centres, self.basis)
-        shapes = [np.shape(array) for array in arrays]
         n = len(self.centres)
-        fits = (
-            np.shape(self.offset) == (4,)
-            and np.shape(self.scale) == (4,)
-            and np.all(self.scale > 0.0)
-            and np.shape(self.centres) == (n, 4)
-            and 0 < n <= SIZES[-1]
-            and np.ndim(self.basis) == 2
-            and len(self.basis) == n
-        )
-        if not fits:
+        if not (
+            np.all(self.scale > 0.0) and 0 < n <= SIZES[-1] and len(self.basis) == n
+        ):
+            shapes = [getattr(self, name).shape for name in SHAPES]
             raise InputError(
-                "kernel: expected offset, scale, centres and basis of shapes (4,), (4,)"
-                f" above 0, (n, 4) and (n, n_features) with n at most {SIZES[-1]}, got"
-                f" {shapes}"
+                "kernel: expected a scale above 0, and 1 to"
+                f" {SIZES[-1]} rows in centres and basis, got shapes {shapes}"
             )
 
     @property
@@ -97,27 +95,16 @@ class Kernel:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers, as a model file has them."""
-        return {
-            "offset": self.offset.tolist(),
-            "scale": self.scale.tolist(),
-            "centres": self.centres.tolist(),
-            "basis": self.basis.tolist(),
-        }
+        return {name: getattr(self, name).tolist() for name in SHAPES}
 
     @classmethod
     def from_dict(cls, content: Any, where: str) -> Self:
         """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
-        shapes: dict[str, tuple[int | None, ...]] = {
-            "offset": (4,),
-            "scale": (4,),
-            "centres": (None, 4),
-            "basis": (None, None),
+        table = check_table(content, where, SHAPES)
+        arrays = {
+            name: check_array(table.get(name), shape, f"{where}.{name}")
+            for name, shape in SHAPES.items()
         }
-        table = check_table(content, where, shapes)
-        arrays = {}
-        for name, shape in shapes.items():
-            numbers = table.get(name)
-            arrays[name] = check_array(numbers, shape, f"{where}.{name}")
         return cls(**arrays)
 
 
