@@ -90,7 +90,6 @@ class Passage:
                 self.model,
                 since + self.dt * reached,
                 states[reached],
-                self.dt,
             )
         return found
 
@@ -303,7 +302,7 @@ def _channels(model: ManoeuvringModel, states: Floats) -> dict[str, Floats]:
 
 
 def unstable(
-    model: ManoeuvringModel, time_s: float, state: Floats, step: float = 0.0
+    model: ManoeuvringModel, time_s: float, state: Floats
 ) -> UnstableModelError:
     """Make the error for a ship whose state grew beyond bounds at a given time."""
     last = dict(zip(model.state_names, state.tolist(), strict=False))
@@ -315,9 +314,6 @@ def unstable(
         heel_deg = np.degrees(last["phi"])
         there += f", phi = {heel_deg:.3g} deg"
     reason = "it is unstable there"
-    longest = LONGEST_STEP * model.travel_time
-    if step > longest:
-        reason += f", or steps of {step:g} s are too long: try {longest:.1g} s"
     if getattr(model.dynamics, "path", None):  # a user's own
         reason += ", or her equations give no number (check_ship_model says where)"
     return UnstableModelError(

@@ -141,29 +141,11 @@ class ShipEquations:
         L = self.particulars["length"]
         U = self.particulars["speed"]
         n = self.service_shaft_speed
-        ship = Ship(
-            length=L,
-            speed=U,
-            rudder_limit=self.steering.limit,
-            rudder_rate=self.steering.rate,
-            gear_frequency=0.0,
-            shaft=n,
-            water_depth=math.inf,
-            scale_speed=U,
-        )
-        motion = Motion(
-            x=0.0,
-            y=0.0,
-            psi=0.1,
-            u=0.9 * U,
-            v=0.1 * U,
-            r=0.1 * U / L,
-            p=0.01,
-            phi=0.01,
-            q=0.0,
-            delta=0.1,
-            n=n,
-        )
+        gear = self.steering
+        ship = Ship(L, U, gear.limit, gear.rate, 0.0, n, math.inf, U)
+        at = {"psi": 0.1, "u": 0.9 * U, "v": 0.1 * U, "r": 0.1 * U / L, "n": n}
+        at |= {"p": 0.01, "phi": 0.01, "delta": 0.1}
+        motion = Motion(**dict.fromkeys(Motion._fields, 0.0) | at)
         c = self.coefficients_record()
         found = asked(self.accelerations, motion, c, ship)
         if not isinstance(found, tuple) or len(found) != len(ACCELERATIONS):

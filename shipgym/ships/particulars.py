@@ -43,28 +43,34 @@ _IN_PRIME_SYSTEM = (
 _ADDED_MASS = ParticularLimits(-1.0, 0.0, _IN_PRIME_SYSTEM)
 _COUPLING = ParticularLimits(-1.0, 1.0, _IN_PRIME_SYSTEM)
 
+
+def _size(growth: float, share: float | None = None) -> ParticularLimits:
+    """Limits of a value above 0 that grows with a power of the length."""
+    return ParticularLimits(above=0.0, growth=growth, share=share)
+
+
 LIMITS = {
     "length": ParticularLimits(0.01, 2000.0, "between perpendiculars, in m"),
-    "beam": ParticularLimits(above=0.0, growth=1.0, share=1.0),
-    "draught": ParticularLimits(above=0.0, growth=1.0, share=0.5),
+    "beam": _size(1.0, 1.0),
+    "draught": _size(1.0, 0.5),
     "mass": ParticularLimits(above=0.0),
     "xg": ParticularLimits(growth=1.0, share=0.5),
-    "yaw_gyradius": ParticularLimits(above=0.0, growth=1.0, share=0.7),
-    "block_coefficient": ParticularLimits(above=0.0, below=1.0),
+    "yaw_gyradius": _size(1.0, 0.7),
+    "block_coefficient": ParticularLimits(0.0, 1.0),
     "speed": ParticularLimits(0.0, 50.0, "in m/s; a knot is 0.514 m/s"),
-    "rudder_area": ParticularLimits(above=0.0, growth=2.0),
-    "propeller_diameter": ParticularLimits(above=0.0, growth=1.0, share=0.5),
-    "rudder_aspect_ratio": ParticularLimits(above=0.0, below=10.0),
-    "propeller_pitch_ratio": ParticularLimits(above=0.0, below=3.0),
-    "rudders": ParticularLimits(above=0.0, below=9.0),
-    "propellers": ParticularLimits(above=0.0, below=9.0),
-    "length_overall": ParticularLimits(above=0.0, growth=1.0, share=2.0),
-    "frontal_area": ParticularLimits(above=0.0, growth=2.0, share=0.5),
-    "lateral_area": ParticularLimits(above=0.0, growth=2.0, share=0.5),
+    "rudder_area": _size(2.0),
+    "propeller_diameter": _size(1.0, 0.5),
+    "rudder_aspect_ratio": ParticularLimits(0.0, 10.0),
+    "propeller_pitch_ratio": ParticularLimits(0.0, 3.0),
+    "rudders": ParticularLimits(0.0, 9.0),
+    "propellers": ParticularLimits(0.0, 9.0),
+    "length_overall": _size(1.0, 2.0),
+    "frontal_area": _size(2.0, 0.5),
+    "lateral_area": _size(2.0, 0.5),
     "lateral_centroid": ParticularLimits(growth=1.0, share=0.5),
-    "lateral_centroid_height": ParticularLimits(above=0.0, growth=1.0, share=0.5),
-    "metacentric_height": ParticularLimits(above=0.0, growth=1.0, share=0.2),
-    "roll_period": ParticularLimits(above=0.0, below=200.0, growth=0.5),
+    "lateral_centroid_height": _size(1.0, 0.5),
+    "metacentric_height": _size(1.0, 0.2),
+    "roll_period": ParticularLimits(0.0, 200.0, growth=0.5),
     "water_density": ParticularLimits(
         500.0, 1500.0, "in kg/m3; fresh water has 1000, sea water 1025"
     ),
