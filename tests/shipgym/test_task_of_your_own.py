@@ -14,7 +14,7 @@ from shipgym import InputError, check_task, register_task
 from shipgym.engine.source import (
     read_source,
 )
-from shipgym.tasks.task import Task
+from shipgym.tasks import Task
 from tests.shipgym.vector_checker import check_vector_env
 
 ROOT = Path(__file__).parents[2]
