@@ -18,8 +18,7 @@ from typer.testing import CliRunner
 import agents
 import identification
 from agents import PID
-from agents.cli import app
-from agents.cli.command import CommandGroup, shared_options
+from agents.cli import CommandGroup, app, shared_options
 from agents.jobs import JobError
 from shipgym import (
     InputError,

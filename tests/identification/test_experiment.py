@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 
 import shipgym
-from identification import build_samples
-from identification.design.experiment import (
-    advise,
-)
+from identification import advise, build_samples
 from shipgym import (
     InputError,
     Particulars,

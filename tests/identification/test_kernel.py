@@ -16,19 +16,16 @@ from identification import (
     KernelResidual,
     identify,
 )
-from shipgym import ShipModel, Trial
+from shipgym import Particulars, ShipModel, SteeringGear, Trial, check_ship_model
 from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag
 from shipgym.models.catalogue import fitted_box
-from shipgym.models.checker import check_ship_model
 from shipgym.models.linear import nomoto
 from shipgym.ships.kernel_boxes import (
     Kernel,
     KernelBox,
     kernel_box,
 )
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.steering import SteeringGear
 
 SHIP = Particulars(name="made up", length=7.0, speed=1.2)
 GEAR = SteeringGear(rudder_limit_deg=35.0, rudder_rate_deg_s=16.0, time_constant=0.0)

@@ -16,7 +16,7 @@ from identification import (
     identify,
 )
 from identification.models.mmg_prior import mmg_prior, reference_coefficients
-from shipgym import InputError, Particulars, ShipModel, Trial, scale_model
+from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.engine.motion import Motion, Ship
 from shipgym.manoeuvres import turning_circle, turning_indices
 from shipgym.models import load_model

@@ -7,10 +7,9 @@ import pytest
 
 import shipgym
 from identification import identify
-from shipgym import Particulars, ShipModel, SteeringGear, Trial
+from shipgym import Particulars, ShipModel, SteeringGear, Trial, list_structures
 from shipgym.manoeuvres import turning_circle, zigzag
-from shipgym.ships import structures
-from shipgym.ships.structures import get_structure, list_structures
+from shipgym.ships import get_structure, structures
 
 L, U0, N0 = 160.93, 7.7175, 1.2
 PARTICULARS = Particulars(length=L, speed=U0)  # accelerations need no mass

@@ -230,7 +230,7 @@ def test_all_rows_of_kvlcc2():
             row["r_rad_s"],
             row["delta_rad"],
         ]
-        rates = load_model(ship).derivatives(state, [row["delta_rad"], row["n_rps"]])
+        rates = ship.derivatives(state, [row["delta_rad"], row["n_rps"]])
         names = ("u_m_s2", "v_m_s2", "r_rad_s2")
         expected = [row[f"paperform_dot_{name}"] for name in names]
         np.testing.assert_allclose(rates[3:6], expected, rtol=1e-10)

@@ -7,9 +7,8 @@ import pandas as pd
 import pytest
 from scipy.io import savemat
 
+from shipgym import ShipFile, Trial
 from shipgym.errors import InputError
-from shipgym.trials.ship_file import ShipFile
-from shipgym.trials.trial import Trial
 from tests.shipgym.one_zigzag import SPEED, sailed
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"

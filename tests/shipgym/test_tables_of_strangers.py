@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from shipgym import Trial
 from shipgym.errors import InputError
 from shipgym.trials.guesses import guess_trial
-from shipgym.trials.trial import Trial
 from shipgym.trials.units import KNOT
 from tests.shipgym.one_zigzag import sailed
 
