@@ -114,7 +114,11 @@ def overview_figure(fit: Fit) -> Figure | None:
     for trial in fitted:
         rudder = np.degrees(trial["delta"])
         lines = [line(trial.t, rudder, "rudder", RUDDER, 1.2)]
-        lines += history_panel(_runs(trial, fit.predictions[trial.name]), "psi").traces
+        first_deg = np.degrees(trial["psi"][0])
+        headings = history_panel(_runs(trial, fit.predictions[trial.name]), "psi")
+        for trace in headings.traces:
+            trace.y = np.asarray(trace.y) - first_deg
+            lines.append(trace)
         shown.append(Panel(lines, "time, s", "deg", PurePath(trial.name).name))
     return panels(shown, 230 * ((len(shown) + 1) // 2) + 80, columns=2, outer=True)
 
