@@ -60,7 +60,7 @@ def prediction_table(result: IdentificationResult, note: str = "") -> Table:
     for heading in ("heading\ndeg", "yaw rate\ndeg/s", "surge\nm/s", "sway\nm/s"):
         table.add_column(heading, justify="right")
     table.add_column(
-        "measured -> predicted\n(rudder reversed at headings)", no_wrap=True
+        "measured → predicted\n(→ rudder reversed at headings)", no_wrap=True
     )
 
     from identification.report.view import index_lines
