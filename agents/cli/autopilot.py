@@ -121,8 +121,6 @@ def print_autopilot(result: AutopilotResult, report: Path, draws: int) -> None:
     if result.verification is not None:
         for name, how in result.verification.tuned.items():
             say(f"settings of {name.upper()} were tuned: {how}")
-        for name, how in result.verification.retuned.items():
-            say(f"{name.upper()} was retuned to hold the models drawn: {how}")
         for name, reason in result.verification.refused.items():
             warn(f"no {name.upper()} autopilot: {reason}")
     say(f"report: {report}")

@@ -199,7 +199,8 @@ def ranking_table(result: AutopilotResult) -> Table:
         f"Autopilots over {metrics['draws']['count']} models drawn, best first",
         "autopilot",
         ">cost, mean",
-        ">cost, 95 %",
+        ">median",
+        ">95 %",
         ">heading rmse, deg",
         ">rudder, deg/min",
         ">gain margin",
@@ -212,6 +213,7 @@ def ranking_table(result: AutopilotResult) -> Table:
         table.add_row(
             name.upper(),
             number(figures["cost_mean"], 2),
+            number(figures["cost_median"], 2),
             number(figures["cost_quantile_95"], 2),
             number(figures["heading_rmse_deg_mean"], 2),
             number(figures["rudder_travel_deg_min_mean"], 1),

@@ -10,12 +10,13 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from agents.controllers.helm import CORNERS, HelmSettings, helm_of
 from agents.controllers.interface import check_names, check_scales, model_hash
 from agents.controllers.law import (
     Gains,
+    HelmMemory,
     Law,
     LinearFeedback,
-    Nothing,
     Number,
     Signals,
     linear_law,
@@ -36,7 +37,7 @@ from agents.controllers.memory import (
     to_rows,
 )
 from agents.settings import Settings
-from shipgym import ShipModel
+from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats, finite
 from shipgym.engine.records import Record, leaves
 from shipgym.files import write_json
@@ -96,7 +97,7 @@ class Controller:
     settings_type: ClassVar[type[Settings] | None] = None
     #: For each gain the signal it acts on and the sign with which it does.
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = {}
-    #: Names of its gains, where they are not those of `feedback`.
+    #: Names of its gains, where they are not those of `feedback` and `HELM`.
     gain_names: ClassVar[tuple[str, ...]] = ()
     #: What it observes of the environment.
     observes: ClassVar[tuple[str, ...]] = OBSERVATION_NAMES
@@ -105,9 +106,9 @@ class Controller:
     #: Its law (`agents.controllers.law`), and the record of what that remembers of each
     #: ship.
     law: ClassVar[Any] = staticmethod(linear_law)
-    memory_record: ClassVar[Record] = Nothing
+    memory_record: ClassVar[Record] = HelmMemory
     #: What its law reads of `Signals` beside the heading error and its integral.
-    reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "sway", "rudder")
+    reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "sway", "surge")
     #: Whether it leads another controller, its `autopilot`, which the file holds too.
     has_autopilot: ClassVar[bool] = False
     #: Whether the file holds its design model too, its `ship`.
@@ -149,7 +150,8 @@ class Controller:
         ship : SampledShip
             The same, linearised and sampled.
         gains : dict of str to float
-            By the names of `feedback`.
+            By the names of `feedback`; those of the helm (`HelmSettings.helm`) are by
+            default without filters.
         design : dict of str to float
             How they were found; Nomoto's K and T are added.
         **more
@@ -160,7 +162,7 @@ class Controller:
         response = nomoto_of(motions.steering, motions.rudder)
         answer = {"nomoto_K": response.K, "nomoto_T": response.T}
         made = cls(
-            gains=gains,
+            gains={**HelmSettings().helm(model, ship.dt), **gains},
             neutral_rudder=ship.about.rudder,
             neutral_sway=ship.about.sway,
             margins=UNKNOWN_MARGINS,
@@ -170,7 +172,30 @@ class Controller:
             design={"dt": ship.dt, **design, **answer},
             **more,
         )
-        return replace(made, margins=made.margins_on(model))
+        return made.filtering_waves(model)
+
+    def filtering_waves(self, model: ShipModel) -> Self:
+        """Complete a design: its margins, and the lowest corner of its wave filter.
+
+        The corner is the lowest that leaves 6 dB and 30 degrees, so that most of the
+        waves is kept from the rudder. Raises InputError if the closed loop is unstable.
+        """
+        if not np.any(self.gains.get("wave_period", 0.0)):
+            return replace(self, margins=self.margins_on(model))
+        failure = None
+        for corner in CORNERS:
+            made = replace(self, gains={**self.gains, "wave_corner": corner})
+            try:
+                made = replace(made, margins=made.margins_on(model))
+            except InputError as error:
+                failure = error
+                continue
+            failure = None
+            if made.margins.is_enough:
+                break
+        if failure is not None:
+            raise failure
+        return made
 
     @property
     def name(self) -> str:
@@ -181,6 +206,11 @@ class Controller:
     def rudder_limit(self) -> float:
         """Largest rudder angle, rad."""
         return self.observation_scales[self.observation_names.index("rudder")]
+
+    @property
+    def service_speed(self) -> float:
+        """Speed that it was designed for, m/s."""
+        return self.observation_scales[self.observation_names.index("surge")]
 
     @property
     def memory_size(self) -> int:
@@ -194,7 +224,7 @@ class Controller:
 
     @property
     def linear_feedback(self) -> LinearFeedback:
-        """Gains by the signals that they act on, and the neutral point."""
+        """Gains by the signals that they act on, the neutral point and the helm."""
         by_signal = dict.fromkeys(SIGNALS, 0.0)
         for gain, (signal, sign) in self.feedback.items():
             by_signal[signal] = sign * self.gains[gain]
@@ -202,20 +232,18 @@ class Controller:
             gains=Gains(**by_signal),
             neutral_rudder=self.neutral_rudder,
             neutral_sway=self.neutral_sway,
+            service_speed=self.service_speed,
+            schedule=self.gains["schedule"],
+            helm=helm_of(self.gains, self.design["dt"], self.rudder_limit),
         )
 
     @property
     def needed_signals(self) -> tuple[str, ...]:
         """Signals of `reads` that have an effect."""
-        is_linear = self.is_closed_form() and self.law is linear_law
-        if not is_linear:
+        if not self.is_closed_form() or self.law is not linear_law:
             return self.reads
-        gains = self.parameters.gains._asdict()
-        read = []
-        for name in self.reads:
-            if gains[name] != 0.0:
-                read.append(name)
-        return tuple(read)
+        effects = {**self.parameters.gains._asdict(), "surge": self.gains["schedule"]}
+        return tuple([name for name in self.reads if effects[name] != 0.0])
 
     @classmethod
     def is_closed_form(cls) -> bool:
@@ -288,6 +316,7 @@ class Controller:
             rudder=known["rudder"],
             heading_error_integral=known["heading_error_integral"],
             surge=known["surge"],
+            last_order=known["last_command"],
         )
 
     def observed(self, observations: Floats) -> dict[str, Floats]:
@@ -300,19 +329,23 @@ class Controller:
         """Return the state with which an episode begins: None."""
 
     def loop(self) -> Compensator:
-        """Linear controller for small motions, without limits, for the margins."""
-        if self.law is linear_law:
-            return Compensator.static(np.array(self.parameters.gains))
-        return self._linearised()
+        """Linear controller for small motions, without limits, for the margins.
 
-    def _linearised(self) -> Compensator:
-        """Law about straight running by central differences; the episode has begun."""
+        It is the law about straight running, by central differences, once the episode
+        has begun, without a dead-band, which small motions would never leave, and
+        without the rate of the gear, which they never reach.
+        """
+        unlimited = {"rudder_band": 0.0, "gear_step": 1e6}
+        gains = {**self.gains}
+        gains |= {name: unlimited[name] for name in unlimited if name in gains}
+        small_law = replace(self, gains=gains)
         n_signals = len(SIGNALS)
-        remembered = np.array(leaves(self.memory_record)) != "started"
+        names = [name.rpartition(".")[2] for name in leaves(self.memory_record)]
+        remembered = np.array(names) != "started"
         n_inputs = n_signals + int(remembered.sum())
         small = SMALL * np.eye(n_inputs)
-        above = self._response(small, remembered)
-        below = self._response(-small, remembered)
+        above = small_law._response(small, remembered)
+        below = small_law._response(-small, remembered)
 
         slopes = (above - below).T / (2.0 * SMALL)
         order = slice(1)
@@ -349,7 +382,8 @@ class Controller:
             heading_error=motions.heading_error,
             rudder=self.neutral_rudder + motions.rudder,
             heading_error_integral=motions.heading_error_integral,
-            surge=zero,
+            surge=zero + self.service_speed,
+            last_order=zero,
         )
         kept = np.ones((len(remembered), n_ships))
         kept[remembered] = deviations.T[len(SIGNALS) :]

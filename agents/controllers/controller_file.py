@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from agents.controllers.controller import ANY_NUMBER, FORMAT, Bounds, Controller
+from agents.controllers.helm import HELM_BOUNDS
 from agents.controllers.interface import check_names
 from agents.controllers.margins import Margins
 from agents.controllers.registry import controller_class, controller_kinds
@@ -67,6 +68,8 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
     check_names(names, design.observes + more, f"{where}: observation_names")
 
     gains = dict.fromkeys(design.gain_names or design.feedback, ANY_NUMBER)
+    if not design.gain_names:
+        gains |= {name: Bounds(*ends) for name, ends in HELM_BOUNDS.items()}
     needed = {name: one for name, one in design.bounds.items() if name not in gains}
     gains |= {name: one for name, one in design.bounds.items() if name in gains}
     rudder = Bounds(-np.pi, np.pi)  # rad

@@ -8,6 +8,7 @@ from typing import Any
 
 from agents.controllers.controller import Controller
 from agents.controllers.interface import model_hash
+from agents.controllers.law import linear_law
 from agents.controllers.registry import controller_class
 from agents.suites.suite import BenchmarkTask, load_tuned
 from shipgym import InputError, ShipModel
@@ -44,10 +45,10 @@ def design(
         Its ship and control interval are used; for guidance its path too.
     settings : mapping, optional
         Keywords of `from_model`; for guidance also those of the LQ that it leads, after
-        `lq_`.
+        `lq_`. Without any the design's own, with a filter for the waves of the task.
     """
     made: Any = controller_class(kind)
-    given = dict(settings or {})
+    given = dict(settings or for_sea(made, task.task))
     if not made.has_autopilot:
         ship = _Ship(task.ship, model_hash(task.ship))
         interval = task.task.interval(task.ship)
@@ -66,6 +67,18 @@ def design(
     return guide
 
 
+def for_sea(made: Any, task: Task) -> dict[str, float]:
+    """Settings of a class of controllers that follow from the sea of a task."""
+    waves = task.weather.waves
+    if waves is None:
+        return {}
+    if made.has_autopilot:
+        return {f"{INNER}wave_period": waves.peak_period}
+    # a Kalman filter knows the course well enough without a model of the waves
+    filters = made.law is linear_law and made.settings_type is not None
+    return {"wave_period": waves.peak_period} if filters else {}
+
+
 def _divided(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Settings of guidance and, by their own names, of the LQ that it leads."""
     own = {}
@@ -82,51 +95,6 @@ def _divided(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any
 def _designed(kind: Any, ship: _Ship, dt: float, settings: str) -> Controller:
     made: Controller = kind.from_model(ship.model, dt=dt, **json.loads(settings))
     return made
-
-
-def with_bandwidth(
-    controller: Controller, model: ShipModel, share: float, task: Task | None = None
-) -> Controller | None:
-    """A design of the same kind with a share of the bandwidth, about that share.
-
-    Guidance is given an autopilot of that bandwidth to lead, along the paths of `task`.
-    None for a kind that has no bandwidth to set. Raises InputError if there is no such
-    design, as `from_model`.
-    """
-    made: Any = type(controller)
-    if controller.has_autopilot:
-        autopilot = getattr(controller, "autopilot", None)
-        if not isinstance(autopilot, Controller):
-            return None
-        led = with_bandwidth(autopilot, model, share)
-        if led is None:
-            return None
-        guide: Controller = made.from_model(model, autopilot=led, task=task)
-        return guide
-
-    settings = bandwidth_settings(controller.design, share)
-    if not settings:
-        return None
-    dt = controller.design["dt"]
-    other: Controller = made.from_model(model, dt=dt, **settings)
-    return other
-
-
-def bandwidth_settings(design: Mapping[str, float], share: float) -> dict[str, float]:
-    """Settings for a share of the bandwidth of a design; empty if it has none.
-
-    Poles are moved in proportion. Of a regulator the weights rise: a heading follows a
-    rudder rate as a triple integrator and a rudder as a double one, whose bandwidths
-    fall with the sixth and the fourth root of their weights.
-    """
-    if "frequency" in design:
-        return {"frequency": share * design["frequency"]}
-    if "rate_weight_s2" in design:
-        return {
-            "rudder_weight": design["rudder_weight"] / share**4,
-            "rate_weight_s2": design["rate_weight_s2"] / share**6,
-        }
-    return {}
 
 
 def tuned(kind: str, task: BenchmarkTask, suite: str) -> Controller:

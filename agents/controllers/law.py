@@ -28,6 +28,7 @@ class Signals(NamedTuple):
     rudder: Number  # rad
     heading_error_integral: Number  # rad s
     surge: Number  # m/s, through the water
+    last_order: Number  # rad, of the rudder
 
 
 class Turns(NamedTuple):
@@ -68,28 +69,111 @@ class Gains(NamedTuple):
     heading_error_integral: float  # 1/s
 
 
+class Biquad(NamedTuple):
+    """Filter of second order, by its coefficients on the last three numbers."""
+
+    in_0: Number = 1.0
+    in_1: Number = 0.0
+    in_2: Number = 0.0
+    out_1: Number = 0.0
+    out_2: Number = 0.0
+
+
+class Helm(NamedTuple):
+    """Filters of an order, and the steering gear that it is given to."""
+
+    wave: Biquad  # takes the waves out
+    update: float  # share of a new order in a low-pass
+    band: float  # rad, by which an order is to differ from the last one
+    gear_share: float  # of the way to its order that the rudder moves in an interval
+    gear_step: float  # rad, by which it moves at most
+    limit: float  # rad, largest rudder
+
+
+class HelmMemory(NamedTuple):
+    """Memory of `given_order`; angles from the neutral rudder."""
+
+    rudder: Number  # rad, by the model of the gear
+    order: Number  # rad, the last one
+    smooth: Number  # rad, order after its low-pass
+    wave_1: Number  # rad, of the wave filter
+    wave_2: Number  # rad
+    started: Number  # 0 where an episode begins, else 1
+
+
 class LinearFeedback(NamedTuple):
     """Parameters of `linear_law`."""
 
     gains: Gains
     neutral_rudder: float  # rad
     neutral_sway: float  # m/s
+    service_speed: float  # m/s, at which the gains are as they stand
+    schedule: float  # 1 for gains by the measured speed, 0 for the same at all speeds
+    helm: Helm
 
 
 def linear_law(
-    seen: Signals, memory: Nothing, p: LinearFeedback
-) -> tuple[Number, Nothing]:
-    """Rudder order from the deviations of straight running."""
+    seen: Signals, memory: HelmMemory, p: LinearFeedback
+) -> tuple[Number, HelmMemory]:
+    """Rudder order from the deviations of straight running.
+
+    A ship at another speed does the same in the time that she needs for her length, so
+    that time scales the gains. The rudder that is fed back is that of a model of the
+    gear: where it were measured, its feedback would eat up the margins of the order.
+    """
+    has_started = memory.started > 0.0
+    last_order = seen.last_order - p.neutral_rudder
+    rudder = np.where(has_started, memory.rudder, last_order)
+    slowness = slowness_of(seen.surge, p.service_speed, p.schedule)
     gains = p.gains
-    order = (
-        p.neutral_rudder
-        + gains.sway * (seen.sway - p.neutral_sway)
-        + gains.yaw_rate * seen.yaw_rate
+    asked = (
+        gains.sway * slowness * (seen.sway - p.neutral_sway)
+        + gains.yaw_rate * slowness * seen.yaw_rate
         + gains.heading_error * seen.heading_error
-        + gains.rudder * (seen.rudder - p.neutral_rudder)
-        + gains.heading_error_integral * seen.heading_error_integral
+        + gains.rudder * rudder
+        + gains.heading_error_integral / slowness * seen.heading_error_integral
     )
-    return order, memory
+    return given_order(asked, memory._replace(rudder=rudder), p)
+
+
+def slowness_of(speed: Number, service_speed: Number, schedule: Number) -> Number:
+    """Service speed over speed as gains follow it; 1 for a schedule of 0."""
+    known = clipped(speed, 0.25 * service_speed, 2.0 * service_speed)
+    return 1.0 + schedule * (service_speed / known - 1.0)
+
+
+def given_order(
+    asked: Number, memory: HelmMemory, p: LinearFeedback
+) -> tuple[Number, HelmMemory]:
+    """Order after its filters, within the limit, and what the gear makes of it."""
+    helm = p.helm
+    has_started = memory.started > 0.0
+    calm, wave_1, wave_2 = filtered(asked, memory, helm.wave)
+    smooth = memory.smooth + helm.update * (calm - memory.smooth)
+    smooth = np.where(has_started, smooth, calm)
+    is_small = np.abs(smooth - memory.order) <= helm.band
+    order = np.where(has_started & is_small, memory.order, smooth)
+
+    given = clipped(p.neutral_rudder + order, -helm.limit, helm.limit)
+    way = helm.gear_share * (given - p.neutral_rudder - memory.rudder)
+    rudder = memory.rudder + clipped(way, -helm.gear_step, helm.gear_step)
+    return given, HelmMemory(rudder, order, smooth, wave_1, wave_2, started=1.0)
+
+
+def filtered(
+    value: Number, memory: HelmMemory, p: Biquad
+) -> tuple[Number, Number, Number]:
+    """Number after a filter, and its memory; at the beginning it is at rest."""
+    has_started = memory.started > 0.0
+    at_rest = (p.in_2 - p.out_2) * value
+    first = np.where(has_started, memory.wave_1, (p.in_1 - p.out_1) * value + at_rest)
+    second = np.where(has_started, memory.wave_2, at_rest)
+    after = p.in_0 * value + first
+    return (
+        after,
+        p.in_1 * value - p.out_1 * after + second,
+        p.in_2 * value - p.out_2 * after,
+    )
 
 
 def clipped(value: Number, low: Number, high: Number) -> Number:

@@ -11,19 +11,12 @@ Hydrodynamics and Motion Control, 13.2 (dead-band and filters of autopilots).
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from agents.controllers.controller import Bounds, Controller
-from agents.controllers.law import (
-    LinearFeedback,
-    Nothing,
-    Number,
-    Signals,
-    linear_law,
-)
+from agents.controllers.controller import Controller
+from agents.controllers.helm import HelmSettings, known
 from agents.controllers.linear_loop import (
     ERROR,
     INTEGRAL,
@@ -34,7 +27,6 @@ from agents.controllers.linear_loop import (
     rate_weight,
     sample_ship,
 )
-from agents.controllers.margins import Compensator
 from agents.settings import Settings, Step, setting
 from shipgym import ShipModel
 from shipgym.arrays import Floats
@@ -44,7 +36,7 @@ from shipgym.tasks.scales import RUDDER_WEIGHT
 
 
 @dataclass(frozen=True)
-class SteeringCost(Settings):
+class SteeringCost(HelmSettings):
     """Weights of an LQ design; that of the squared heading error is 1.
 
     They are those of the environment's reward, with that of the rudder rate raised for
@@ -104,54 +96,19 @@ class LQSettings(SteeringCost):
     )
 
 
-class QuietFeedback(NamedTuple):
-    """Parameters of `quiet_law`."""
-
-    feedback: LinearFeedback
-    rudder_update: float  # share of a new order in its low-pass
-    rudder_band: float  # rad that an order is to differ from the last one
-
-
-class QuietMemory(NamedTuple):
-    """Memory of `quiet_law`."""
-
-    smooth: Number  # rad, order after its low-pass
-    order: Number  # rad, the last one
-    started: Number  # 0 where an episode begins, else 1
-
-
-def quiet_law(
-    seen: Signals, memory: QuietMemory, p: QuietFeedback
-) -> tuple[Number, QuietMemory]:
-    """Order of the linear law, smoothed, and held while it hardly changes."""
-    asked, _ = linear_law(seen, Nothing(), p.feedback)
-    filtered = memory.smooth + p.rudder_update * (asked - memory.smooth)
-    has_started = memory.started > 0.0
-    smooth = np.where(has_started, filtered, asked)
-
-    is_small = np.abs(smooth - memory.order) <= p.rudder_band
-    order = np.where(has_started & is_small, memory.order, smooth)
-    return order, QuietMemory(smooth, order, started=1.0)
-
-
 @dataclass(frozen=True, eq=False)
 class LQ(Controller):
     """Linear quadratic autopilot with integral action and neutral rudder.
 
     order = neutral rudder + sum of gain times deviation of sway, yaw rate, heading
-    error, rudder and the integral of the heading error, filtered where it is asked for.
+    error, the rudder of a model of the gear and the integral of the heading error,
+    filtered where it is asked for.
     """
 
     kind: ClassVar[str] = "lq"
     settings_type: ClassVar[type[Settings]] = LQSettings
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = {
         signal: (signal, 1.0) for signal in SIGNALS
-    }
-    gain_names: ClassVar[tuple[str, ...]] = (*SIGNALS, "rudder_update", "rudder_band")
-    bounds: ClassVar[Mapping[str, Bounds]] = {
-        **Controller.bounds,
-        "rudder_update": Bounds(1e-6, 1.0),
-        "rudder_band": Bounds(0.0, np.pi),
     }
 
     @classmethod
@@ -165,7 +122,7 @@ class LQ(Controller):
         first order.
 
         Raises InputError if the model has no straight course, a setting is out of its
-        range, or the low-pass makes the loop unstable.
+        range, or a filter makes the loop unstable.
 
         Parameters
         ----------
@@ -175,7 +132,8 @@ class LQ(Controller):
             Control interval, s; by default that of the environment.
         **settings
             Fields of `LQSettings`: `rudder_weight`, `rate_weight_s2`,
-            `integral_lengths`, `rudder_time`, `rudder_band_deg`.
+            `integral_lengths`, `rudder_time`, `rudder_band_deg`, `wave_period`,
+            `schedule`.
         """
         interval = checked_interval(model, dt)
         own = LQSettings(**settings).completed(model, interval)
@@ -185,37 +143,11 @@ class LQ(Controller):
         low_pass = own.rudder_time * model.travel_time
         gains = {
             **own.gains(measured, model.travel_time),
+            **own.helm(model, interval),
             "rudder_update": interval / (interval + low_pass),
             "rudder_band": float(np.radians(own.rudder_band_deg)),
         }
-        return cls.designed(model, ship, gains, own.to_dict())
-
-    def __post_init__(self) -> None:
-        if self.is_quiet:
-            object.__setattr__(self, "law", quiet_law)
-            object.__setattr__(self, "memory_record", QuietMemory)
-
-    @property
-    def is_quiet(self) -> bool:
-        """True with a low-pass or a dead-band."""
-        filters = np.any(self.gains["rudder_update"] != 1.0)
-        return bool(filters or np.any(self.gains["rudder_band"] != 0.0))
-
-    @cached_property
-    def parameters(self) -> Any:
-        """Parameters of its law."""
-        if not self.is_quiet:
-            return self.linear_feedback
-        return QuietFeedback(
-            self.linear_feedback,
-            rudder_update=self.gains["rudder_update"],
-            rudder_band=self.gains["rudder_band"],
-        )
-
-    def loop(self) -> Compensator:
-        """Loop without the dead-band, which small motions would never leave."""
-        without = replace(self, gains={**self.gains, "rudder_band": 0.0})
-        return super(LQ, without).loop()
+        return cls.designed(model, ship, gains, known(own))
 
 
 def lq_gain(ship: SampledShip, cost: SteeringCost, travel_time: float) -> Floats:

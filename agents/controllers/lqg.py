@@ -6,15 +6,23 @@ Moore 1990, Optimal Control, chapter 8.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from agents.controllers.controller import Bounds, Controller
+from agents.controllers.helm import known
 from agents.controllers.kalman import course_filter, with_waves
-from agents.controllers.law import Gains, Number, Signals, wrapped
+from agents.controllers.law import (
+    HelmMemory,
+    LinearFeedback,
+    Number,
+    Signals,
+    linear_law,
+    wrapped,
+)
 from agents.controllers.linear_loop import checked_interval, sample_ship
 from agents.controllers.lq import LQ, SteeringCost
 from agents.controllers.margins import check_stable
@@ -22,7 +30,6 @@ from agents.controllers.memory import from_columns
 from agents.settings import Settings, Step, setting
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
-from shipgym.checks import check_number
 from shipgym.engine.records import Record
 from shipgym.models.by_name import takes_name
 
@@ -82,37 +89,42 @@ class Observer(NamedTuple):
     effect: Motions  # of the mean rudder between two measurements, per rad
     kalman: KalmanGains
     output: Output
-    gains: Gains
-    neutral_rudder: float  # rad
     new_course: float  # rad, least jump of the heading error that is one
+    feedback: LinearFeedback
 
 
 class LQGMemory(NamedTuple):
     """Memory of `lqg_law`."""
 
     motions: Motions
-    rudder: Number  # rad, at the last measurement, from its neutral angle
-    started: Number  # 0 where an episode begins, else 1
+    rudder: Number  # rad, of the model at the last measurement, from its neutral angle
+    helm: HelmMemory
 
 
 def lqg_law(seen: Signals, memory: LQGMemory, p: Observer) -> tuple[Number, LQGMemory]:
     """Correct the estimate by what is measured and feed it back."""
-    rudder = seen.rudder - p.neutral_rudder
-    before = np.where(memory.started > 0.0, memory.rudder, rudder)
-    mean_rudder = 0.5 * (before + rudder)
-    expected = predicted(seen, memory, mean_rudder, p)
-    now = updated(seen, expected, p)
-
-    gains = p.gains
-    order = (
-        p.neutral_rudder
-        + gains.rudder * rudder
-        + gains.heading_error_integral * seen.heading_error_integral
-        + gains.sway * now.sway
-        + gains.yaw_rate * now.yaw_rate
-        + gains.heading_error * now.heading_error
+    mean_rudder = 0.5 * (memory.rudder + memory.helm.rudder)
+    now = updated(seen, predicted(seen, memory, mean_rudder, p), p)
+    estimated = seen._replace(
+        sway=p.feedback.neutral_sway + now.sway,
+        yaw_rate=now.yaw_rate,
+        heading_error=now.heading_error,
     )
-    return order, LQGMemory(now, rudder, 1.0)
+    order, helm = linear_law(estimated, memory.helm, p.feedback)
+    return order, LQGMemory(now, memory.helm.rudder, helm)
+
+
+def predicted(
+    seen: Signals, memory: LQGMemory, mean_rudder: Number, p: Observer
+) -> Motions:
+    """States expected at this measurement; where an episode begins, those measured."""
+    began = memory.helm.started > 0.0
+    measured = Motions(0.0, seen.yaw_rate, seen.heading_error, 0.0, 0.0)
+    expected = [
+        np.where(began, product(row, memory.motions) + effect * mean_rudder, first)
+        for row, effect, first in zip(p.transition, p.effect, measured, strict=True)
+    ]
+    return Motions(*expected)
 
 
 def updated(seen: Signals, expected: Motions, p: Observer) -> Motions:
@@ -123,62 +135,16 @@ def updated(seen: Signals, expected: Motions, p: Observer) -> Motions:
     # a jump that neither noise nor the ship can make is a new course
     jump = np.where(np.abs(off_heading) > p.new_course, off_heading, 0.0)
     innovation = Measured(off_rate, off_heading - jump)
-
-    gain = p.kalman
-    sway = corrected(gain.sway, innovation)
-    yaw_rate = corrected(gain.yaw_rate, innovation)
-    heading_error = corrected(gain.heading_error, innovation)
-    wave_heading = corrected(gain.wave_heading, innovation)
-    wave_yaw_rate = corrected(gain.wave_yaw_rate, innovation)
-    return Motions(
-        sway=expected.sway + sway,
-        yaw_rate=expected.yaw_rate + yaw_rate,
-        heading_error=wrapped(expected.heading_error + jump + heading_error),
-        wave_heading=expected.wave_heading + wave_heading,
-        wave_yaw_rate=expected.wave_yaw_rate + wave_yaw_rate,
-    )
+    states = expected._replace(heading_error=expected.heading_error + jump)
+    pairs = zip(p.kalman, states, strict=True)
+    now = Motions(*[state + product(row, innovation) for row, state in pairs])
+    return now._replace(heading_error=wrapped(now.heading_error))
 
 
-def predicted(
-    seen: Signals, memory: LQGMemory, mean_rudder: Number, p: Observer
-) -> Motions:
-    """States expected at this measurement; where an episode begins, those measured."""
-    rows = p.transition
-    effect = p.effect
-    before = memory.motions
-    sway = product(rows.sway, before) + effect.sway * mean_rudder
-    yaw_rate = product(rows.yaw_rate, before) + effect.yaw_rate * mean_rudder
-    error = product(rows.heading_error, before) + effect.heading_error * mean_rudder
-    wave_heading = product(rows.wave_heading, before)
-    wave_yaw_rate = product(rows.wave_yaw_rate, before)
-
-    began = memory.started > 0.0
-    return Motions(
-        sway=np.where(began, sway, 0.0),
-        yaw_rate=np.where(began, yaw_rate, seen.yaw_rate),
-        heading_error=np.where(began, error, seen.heading_error),
-        wave_heading=wave_heading,
-        wave_yaw_rate=wave_yaw_rate,
-    )
-
-
-def product(row: Motions, states: Motions) -> Number:
+def product(row: Any, states: Any) -> Number:
     """Row of a matrix times the states."""
-    return (
-        row.sway * states.sway
-        + row.yaw_rate * states.yaw_rate
-        + row.heading_error * states.heading_error
-        + row.wave_heading * states.wave_heading
-        + row.wave_yaw_rate * states.wave_yaw_rate
-    )
-
-
-def corrected(row: Measured, innovation: Measured) -> Number:
-    """Row of the Kalman gain times the innovation."""
-    return (
-        row.yaw_rate * innovation.yaw_rate
-        + row.heading_error * innovation.heading_error
-    )
+    pairs = zip(row[1:], states[1:], strict=True)
+    return sum([a * b for a, b in pairs], row[0] * states[0])
 
 
 @dataclass(frozen=True)
@@ -191,23 +157,32 @@ class LQGSettings(SteeringCost):
         above=0.0,
         search=Step(1.0),
     )
-    disturbance_deg: float = setting(
+    disturbance_deg: float | None = setting(
         "how much the sea pushes the ship: standard deviation of a rudder angle, drawn"
         " in each interval, that would do the same; more makes the filter trust what"
-        " is measured",
-        2.0,
+        " is measured; by default 2, and more where the loop's margins need it",
+        None,
         above=0.0,
         search=Step(1.0),
     )
-    wave_period: float | None = setting(
-        "of the first-order motion, s, as it is met; by default it is not modelled",
-        None,
-        above=0.0,
-        search=Step(0.3, reach=3.0),
-    )
     wave_heading_deg: float = setting(
-        "standard deviation of the heading in it, degrees", 1.0, above=0.0
+        "standard deviation of the heading in the waves, degrees", 1.0, above=0.0
     )
+
+    def completed(self, model: ShipModel, dt: float) -> Self:
+        """Fill in what follows from a model; `dt`: control interval, s.
+
+        Noise at the rudder is raised until the loop has 6 dB and 30 degrees, towards
+        the margins of LQ (loop transfer recovery).
+        """
+        own = super().completed(model, dt)
+        if own.disturbance_deg is not None:
+            return own
+        for deviation in (2.0, 4.0, 8.0, 16.0, 32.0, 64.0):
+            own = replace(own, disturbance_deg=deviation)
+            if LQG.of_settings(model, dt, own).margins.is_enough:
+                break
+        return own
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -217,8 +192,8 @@ class LQG(Controller):
     The filter is stationary and reads noisy heading and yaw rate; the measured sway
     speed is not used. Its states are sway, yaw rate and
     heading error and, where a wave period is given, heading and rate of the first-order
-    motion, which is not answered with rudder. Its input is the measured rudder, so
-    limits of the steering gear do not mislead it. A jump of the heading error that
+    motion, which is not answered with rudder. Its input is the rudder of a model of the
+    gear, which knows its limits. A jump of the heading error that
     neither noise nor the ship can make is taken as a new course.
 
     Attributes
@@ -239,7 +214,7 @@ class LQG(Controller):
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
     law: ClassVar[Any] = staticmethod(lqg_law)
     memory_record: ClassVar[Record] = LQGMemory
-    reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "rudder")
+    reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "surge")
     arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {
         "transition": ("states", "states"),
         "input": ("states",),
@@ -287,28 +262,26 @@ class LQG(Controller):
         """
         interval = checked_interval(model, dt)
         own = LQGSettings(**settings).completed(model, interval)
+        return cls.of_settings(model, interval, own)
+
+    @classmethod
+    def of_settings(cls, model: ShipModel, interval: float, own: LQGSettings) -> Self:
+        """Design by whole settings; `interval`: between two commands, s."""
         ship = sample_ship(model, interval)
-        disturbance = np.radians(own.disturbance_deg)
+        given: Any = own
+        disturbance = float(np.radians(given.disturbance_deg))
+        helm = {**own.helm(model, interval), "wave_period": 0.0}  # the filter has it
         states = course_filter(model, ship.about, interval, disturbance)
         if own.wave_period is not None:
-            check_number(
-                own.wave_period,
-                "wave_period",
-                above=2.0 * interval,
-                hint="two control intervals, in s",
-            )
             deviation = np.radians(own.wave_heading_deg)
             states = with_waves(states, own.wave_period, deviation, interval)
         gain, deviations = states.gain(own.noise)
 
-        design = own.to_dict()
-        if own.wave_period is None:
-            del design["wave_period"]
         return cls.designed(
             model,
             ship,
-            own.gains(ship, model.travel_time),
-            {**design, "new_course_rad": max(NEW_COURSE, GATE * deviations[1])},
+            {**own.gains(ship, model.travel_time), **helm},
+            {**known(own), "new_course_rad": max(NEW_COURSE, GATE * deviations[1])},
             transition=states.transition,
             input=states.effect,
             kalman=gain,
@@ -326,9 +299,8 @@ class LQG(Controller):
             effect=_filled(Motions, self.input, (n_states,)),
             kalman=_filled(KalmanGains, self.kalman, (n_states, n_measured)),
             output=_filled(Output, self.output, (n_measured, n_states)),
-            gains=self.linear_feedback.gains,
-            neutral_rudder=self.neutral_rudder,
             new_course=self.design["new_course_rad"],
+            feedback=self.linear_feedback,
         )
 
 

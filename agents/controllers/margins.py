@@ -1,31 +1,32 @@
 """Margins and bandwidth of the loop of a linear controller around a sampled ship."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.controllers.linear_loop import ERROR, INTEGRAL, RUDDER, SIGNALS, SampledShip
+from agents.controllers.linear_loop import ERROR, INTEGRAL, SIGNALS, SampledShip
 from shipgym import InputError
-from shipgym.arrays import Floats, Integers
+from shipgym.arrays import Floats
 
 Complexes = NDArray[np.complex128]
 
-SLOWEST, FASTEST = 1e-4, 0.999  # of them, over the Nyquist frequency
+SLOWEST = 1e-4  # of the frequencies, over the Nyquist frequency
+N_FREQUENCIES = 1500
 
 
 @dataclass(frozen=True)
 class Margins:
-    """Largest changes of the rudder's effect on the ship that leave the loop stable.
+    """Largest changes at any one place of the loop that leave it stable.
 
-    The loop is broken where the ship's motions are fed back; the rudder's own feedback,
-    if there is one, belongs to the steering gear and stays closed.
+    The loop is broken where the order leaves the autopilot, and at each measurement
+    that it feeds back, heading with its integral; the others stay closed.
 
     Attributes
     ----------
     gain_margin : float
-        Factor by which the loop gain may be raised; infinite where there is no limit.
+        Factor by which a gain may be raised; infinite where there is no limit.
     phase_margin_deg : float
         Phase that may be lost, degrees.
     delay_margin_s : float
@@ -33,8 +34,8 @@ class Margins:
     bandwidth_rad_s : float
         Of the heading following its set-point, to -3 dB, rad/s.
     lowest_gain : float
-        Factor down to which the loop gain may be lowered; 0 where there is no limit.
-        The integral, and a ship unstable on its course, need some.
+        Factor down to which the gain of the order may be lowered; 0 where there is no
+        limit. The integral, and a ship unstable on its course, need some.
     """
 
     gain_margin: float
@@ -43,11 +44,16 @@ class Margins:
     bandwidth_rad_s: float
     lowest_gain: float = 0.0
 
+    @property
+    def is_enough(self) -> bool:
+        """True for 6 dB and 30 degrees."""
+        return self.gain_margin >= 2.0 and self.phase_margin_deg >= 30.0
+
 
 class Responses(NamedTuple):
-    """Frequency responses of a loop, each of shape (n_frequencies,)."""
+    """Frequency responses of a loop."""
 
-    broken: Complexes  # of the loop broken at the ship's motions
+    broken: dict[str, Complexes]  # each of shape (n_frequencies,), by place of break
     following: Complexes  # from set-point to heading
 
 
@@ -68,16 +74,6 @@ class Compensator:
     B: Floats
     C: Floats
     D: Floats
-
-    @classmethod
-    def static(cls, gains: Floats) -> Self:
-        """Feedback without a memory, by gains of shape (5,)."""
-        return cls(
-            A=np.zeros((0, 0)),
-            B=np.zeros((0, len(SIGNALS))),
-            C=np.zeros((1, 0)),
-            D=gains[None],
-        )
 
     def closed_loop(self, ship: SampledShip) -> Floats:
         """Matrix of ship and memory from one control interval to the next.
@@ -101,32 +97,26 @@ class Compensator:
         return np.delete(without, INTEGRAL, axis=1)
 
     def margins(self, ship: SampledShip, name: str) -> Margins:
-        """Stability margins and bandwidth with a ship.
+        """Stability margins and bandwidth with a ship, by frequency responses.
 
-        The margins follow from the frequency response of the sampled loop
-        (`control.stability_margins`). `name` is that of the design. Raises InputError
-        if the closed loop is unstable.
+        `name` is that of the design. Raises InputError if the closed loop is unstable.
         """
-        import control
-
         self._check_closed_loop(ship, name)
-        omega = frequencies_of(ship)
+        omega = np.geomspace(SLOWEST, 1.0, N_FREQUENCIES) * np.pi / ship.dt
         response = self.responses(ship, omega)
-        near = near_crossings(response.broken)
-        loop: Any = control.frd(response.broken[near], omega[near])
-        figures = control.stability_margins(loop, returnall=True)
-        gains, phases, _, _, crossings, _ = map(np.asarray, figures)
-
-        raised = gains[gains > 1.0]
-        lowered = gains[gains < 1.0]
-        delays = np.radians(phases % 360.0) / crossings
-        size = np.abs(response.following)
+        breaks = {
+            place: crossings(omega, broken) for place, broken in response.broken.items()
+        }
+        phases = np.concatenate([one.phases_deg for one in breaks.values()])
+        delays = np.concatenate([one.delays_s for one in breaks.values()])
+        gains = np.concatenate([one.gains for one in breaks.values()])
+        at_order = breaks["order"].gains
         return Margins(
-            gain_margin=least(raised),
+            gain_margin=least(gains[gains > 1.0]),
             phase_margin_deg=least(np.abs(phases)),
             delay_margin_s=least(delays),
-            bandwidth_rad_s=bandwidth(omega, size),
-            lowest_gain=float(np.max(lowered, initial=0.0)),
+            bandwidth_rad_s=bandwidth(omega, np.abs(response.following)),
+            lowest_gain=float(np.max(at_order[at_order < 1.0], initial=0.0)),
         )
 
     def _check_closed_loop(self, ship: SampledShip, name: str) -> None:
@@ -144,47 +134,58 @@ class Compensator:
     def responses(self, ship: SampledShip, omega: Floats) -> Responses:
         """Frequency responses at frequencies in rad/s, shape (n_frequencies,)."""
         z = np.exp(1j * omega * ship.dt)
-        by_order = _transfer(ship.A, ship.B, z)
-        motions = by_order[:, :, 0].T
+        motions = _transfer(ship.A, ship.B, z)[:, :, 0].T
         of_memory = self.C @ _transfer(self.A, self.B, z)
         orders = (of_memory + self.D)[:, 0].T
+        fed_back = dict(zip(SIGNALS, orders * motions, strict=True))
+        heading = fed_back.pop("heading_error_integral") + fed_back["heading_error"]
+        fed_back["heading_error"] = heading
+        whole = np.sum(list(fed_back.values()), axis=0)
 
-        fed_back = orders * motions
-        by_rudder = fed_back[RUDDER]
-        by_motions = fed_back.sum(axis=0) - by_rudder
-        open_gear = 1.0 - by_rudder
-
+        broken = {"order": -whole}
+        for signal, own in fed_back.items():
+            if own.any():
+                broken[signal] = -own / (1.0 - (whole - own))
         integral = ship.dt / (z - 1.0)  # of the set-point
         set_point = orders[ERROR] + orders[INTEGRAL] * integral
-        to_heading = -motions[ERROR] * set_point
-        closed = open_gear - by_motions
-        return Responses(
-            broken=-by_motions / open_gear,
-            following=to_heading / closed,
-        )
+        following = -motions[ERROR] * set_point / (1.0 - whole)
+        return Responses(broken, following)
 
 
 def frequencies_of(ship: SampledShip) -> Floats:
-    """Frequencies of the responses with a ship, rad/s; splines lie between them."""
-    n_frequencies = 500
-    nyquist = np.pi / ship.dt
-    return np.geomspace(SLOWEST * nyquist, FASTEST * nyquist, n_frequencies)
+    """Frequencies of the responses with a ship, rad/s, up to Nyquist's."""
+    return np.geomspace(SLOWEST, 1.0, N_FREQUENCIES) * np.pi / ship.dt
 
 
-def near_crossings(response: Complexes) -> Integers:
-    """Numbers of the frequencies about those at which margins are read.
+class Crossings(NamedTuple):
+    """Where the response of a broken loop passes -1."""
 
-    There a response, of shape (n_frequencies,), crosses the unit circle or the real
-    axis. Splines through all frequencies take several times as long and say the same.
+    gains: Floats  # factors with which it would
+    phases_deg: Floats  # by which it would have to be turned
+    delays_s: Floats
+
+
+def crossings(omega: Floats, response: Complexes) -> Crossings:
+    """Crossings of the negative real axis and of the unit circle, on straight lines.
+
+    `omega`: rad/s; `response`: at these frequencies, the last of which is Nyquist's,
+    where it is real.
     """
-    about, apart = 12, 12  # frequencies on each side of a crossing, and elsewhere
-    outside = np.abs(response) > 1.0
-    above = response.imag > 0.0
-    crosses = np.diff(outside) | np.diff(above)
-    places = np.flatnonzero(crosses)[:, None] + np.arange(-about, about + 2)
-    elsewhere = np.arange(0, len(response), apart)  # a spline swings across a gap
-    kept = np.append(elsewhere, places.clip(0, len(response) - 1))
-    return np.unique(kept)
+    before, after = response[:-1], response[1:]
+    place = np.flatnonzero(np.diff(response.imag > 0.0))
+    share = before.imag[place] / (before.imag[place] - after.imag[place])
+    real = before.real[place] + share * (after.real[place] - before.real[place])
+    real = np.append(real, response.real[-1])
+
+    size = np.log(np.abs(response))
+    place = np.flatnonzero(np.diff(size > 0.0))
+    share = size[place] / (size[place] - size[place + 1])
+    turned = share * np.angle(after[place] / before[place])
+    phases = np.degrees(np.angle(-before[place]) + turned)
+    phases = (phases + 180.0) % 360.0 - 180.0
+    at = omega[place] * (omega[place + 1] / omega[place]) ** share
+    delays = np.radians(phases % 360.0) / at
+    return Crossings(-1.0 / real[real < 0.0], phases, delays)
 
 
 def least(values: Floats) -> float:

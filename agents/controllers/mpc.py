@@ -23,6 +23,7 @@ from agents.controllers.controller import Bounds
 from agents.controllers.guided import with_path
 from agents.controllers.interface import Policy
 from agents.controllers.law import (
+    HelmMemory,
     Nothing,
     Number,
     PathSignals,
@@ -421,7 +422,7 @@ class DesignModels:
 
         crab = self.crab_share * self.drift()
         seen = self.signals(course - crab)
-        order, _ = linear_law(seen, Nothing(), self.feedback)
+        order, _ = linear_law(seen, self.helm(), self.feedback)
         self.engine.command[0] = np.clip(order / self.rudder_limit, -1.0, 1.0)
         self.engine.advance()
         self.time += self.dt
@@ -429,6 +430,11 @@ class DesignModels:
         self._observe()
         self.progress = self.place.along_track - place_before.along_track
         self.moved = np.abs(self.rudder - rudder_before)
+
+    def helm(self) -> HelmMemory:
+        """Memory of LQ, which knows the rudder by its model of the gear."""
+        zero = np.zeros_like(self.rudder)
+        return HelmMemory(zero, zero, zero, zero, zero, started=zero)
 
     def drift(self) -> Floats:
         """Angle from the velocity through the water to that over ground, rad."""
@@ -452,6 +458,7 @@ class DesignModels:
             rudder=self.rudder,
             heading_error_integral=zero,
             surge=self.read("u"),
+            last_order=self.rudder,
         )
 
 

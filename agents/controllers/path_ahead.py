@@ -52,9 +52,7 @@ class Arc:
         """
         past = leg.x - self.distance
         to_centre = self.radius - self.side * leg.y
-        # of the radius: nearer to the centre of an arc no position is taken
-        innermost = 0.1
-        swept = np.arctan2(past, np.maximum(to_centre, innermost * self.radius))
+        swept = np.arctan2(past, to_centre)
         entered = leg.reached & (past > 0.0) & (self.angle > 0.0)
         self.passed = self.passed | (entered & (swept >= self.angle))
 

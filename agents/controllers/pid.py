@@ -12,6 +12,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from agents.controllers.controller import Controller
+from agents.controllers.helm import HelmSettings, known
 from agents.controllers.linear_loop import (
     checked_interval,
     rate_weight,
@@ -23,10 +24,11 @@ from shipgym import ShipModel
 from shipgym.models.by_name import takes_name
 from shipgym.models.linear import Nomoto, nomoto_of
 from shipgym.tasks.scales import RUDDER_WEIGHT
+from shipgym.trials.sensors import SEA_TRIAL
 
 
 @dataclass(frozen=True)
-class PIDSettings(Settings):
+class PIDSettings(HelmSettings):
     """Settings of PID."""
 
     frequency: float | None = setting(
@@ -47,6 +49,19 @@ class PIDSettings(Settings):
         20.0,
         above=0.0,
         search=Step(1.0),
+    )
+
+    noise: float = setting(
+        "of heading and yaw rate, in multiples of a sea trial's sensors (`SEA_TRIAL`)",
+        1.0,
+        at_least=0.0,
+    )
+    rudder_time: float | None = setting(
+        "time constant of a low-pass on the order, in times to travel one ship length;"
+        " by default that with which noise moves the rudder by 10 deg a minute",
+        None,
+        at_least=0.0,
+        search=Step(1.2, start=0.05),
     )
 
     def completed(self, model: ShipModel, dt: float) -> Self:
@@ -110,7 +125,7 @@ class PID(Controller):
         dt : float, optional
             Control interval, s; by default that of the environment.
         **settings
-            Fields of `PIDSettings`: `frequency`, `damping`, `integral_lengths`.
+            Fields of `PIDSettings`.
         """
         interval = checked_interval(model, dt)
         ship = sample_ship(model, interval)
@@ -123,7 +138,13 @@ class PID(Controller):
             own.damping,
             slow=own.integral_pole(model),
         )
-        return cls.designed(model, ship, gains, {**own.to_dict(), "lag": lag})
+        gains |= own.helm(model, interval)
+        if own.rudder_time is None:
+            gains["rudder_update"] = quiet_update(gains, own.noise, interval)
+        else:
+            low_pass = own.rudder_time * model.travel_time
+            gains["rudder_update"] = interval / (interval + low_pass)
+        return cls.designed(model, ship, gains, {**known(own), "lag": lag})
 
 
 def nomoto(model: ShipModel) -> Nomoto:
@@ -139,6 +160,23 @@ def lag_of(model: ShipModel, dt: float) -> float:
     """
     lag_share = 0.5
     return lag_share * model.steering.time_constant + 0.5 * dt
+
+
+def quiet_update(gains: Mapping[str, float], noise: float, dt: float) -> float:
+    """Share of a new order in a low-pass with which noise moves the rudder little.
+
+    `noise`: in multiples of a sea trial's sensors; `dt`: s. An order of noise of
+    standard deviation s moves by 0.8 a s (2 / (2 - a))^(1/2) in the mean. The low-pass
+    takes at most a fifth of the time by which the derivative leads.
+    """
+    by_rate = gains["derivative"] * SEA_TRIAL["r"].noise
+    by_heading = gains["proportional"] * SEA_TRIAL["psi"].noise
+    deviation = noise * float(np.hypot(by_rate, by_heading))
+    allowed = np.radians(10.0) / 60.0 * dt
+    lead = gains["derivative"] / gains["proportional"]
+    least = dt / (dt + 0.2 * lead)
+    share = allowed / max(0.8 * deviation, 1e-12)
+    return float(np.clip(share, least, 1.0))
 
 
 class Poles(NamedTuple):

@@ -31,7 +31,13 @@ from agents.controllers.guided import (
     with_path,
 )
 from agents.controllers.interface import Policy
-from agents.controllers.law import Number, PathSignals, clipped, wrapped
+from agents.controllers.law import (
+    Number,
+    PathSignals,
+    clipped,
+    slowness_of,
+    wrapped,
+)
 from agents.controllers.lq import LQ
 from agents.controllers.seen_current import (
     CurrentMemory,
@@ -63,6 +69,7 @@ class PreviewGains(NamedTuple):
     current_update: float  # share of a new current in its low-pass
     yaw_update: float  # share of a new yaw rate in its low-pass
     yaw_gain: float  # s: gain of LQ on the yaw rate over that on the heading error
+    schedule: float  # of LQ's gain on the yaw rate by the speed
     sway_gain: float  # s/m: rad of course per m/s of sway
     roll_gain: float  # rad of course per rad of heel
     roll_rate_gain: float  # s: rad of course per rad/s of heel
@@ -97,7 +104,8 @@ def preview_law(
     by_heading = quiet * np.exp(p.speed_power * np.log(slowness))
     turning = own_yaw_rate(seen, off, memory, current, p)
     yaw_rate = memory.yaw_rate + p.yaw_update * (turning - memory.yaw_rate)
-    by_yaw_rate = p.yaw_gain * (yaw_rate - seen.yaw_rate)
+    by_schedule = slowness_of(seen.surge, p.service_speed, p.schedule)
+    by_yaw_rate = p.yaw_gain * by_schedule * (yaw_rate - seen.yaw_rate)
     by_roll = p.roll_gain * seen.roll + p.roll_rate_gain * seen.roll_rate
     most = 3.0  # rad; wrapped, a larger one would turn the rudder to the other side
     asked = by_heading + by_yaw_rate + by_roll + p.sway_gain * seen.sway
@@ -348,6 +356,7 @@ class PreviewSettings(Settings):
             "current_update": dt / (dt + self.current_time * travel_time),
             "yaw_update": dt / (dt + self.yaw_time * travel_time),
             "yaw_gain": inner["yaw_rate"] / inner["heading_error"],
+            "schedule": inner["schedule"],
             "sway_gain": self.sway_gain / speed,
             "roll_rate_gain": self.roll_time * travel_time,
             "dead_band": float(np.radians(self.dead_band_deg)),
@@ -364,7 +373,7 @@ class PreviewSettings(Settings):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PreviewLQ(Guided):
-    """LQ around the course of the path ahead: track keeping by 22 numbers."""
+    """LQ around the course of the path ahead: track keeping by 23 numbers."""
 
     kind: ClassVar[str] = "preview-lq"
     settings_type: ClassVar[type[Settings]] = PreviewSettings

@@ -21,7 +21,7 @@ from agents.controllers.law import (
     gathered,
     wrapped,
 )
-from agents.export.source import Variable, Variables
+from agents.export.source import Variable, Variables, variables_of
 from shipgym import InputError
 from shipgym.engine.records import field_types
 from shipgym.tasks import path_following
@@ -31,58 +31,33 @@ from shipgym.tasks.steering import Extras, SteeringSignals
 
 
 class BridgeInput(NamedTuple):
-    """Input of an autopilot, with units and signs as in `AUTOPILOT_INPUTS`."""
+    """What an autopilot may read."""
 
+    # rad, heading to steer, clockwise from north; of guidance the direction of the path
+    # beside the ship
     set_point: Number
-    heading: Number
-    yaw_rate: Number = 0.0
-    sway: Number = 0.0
-    surge: Number = 0.0
-    rudder: Number = 0.0
+    heading: Number  # rad, clockwise from north
+    yaw_rate: Number = 0.0  # rad/s, to starboard positive
+    sway: Number = 0.0  # m/s, through the water, to starboard positive
+    surge: Number = 0.0  # m/s, through the water
+    rudder: Number = 0.0  # rad, measured angle, to starboard positive
+    # m, distance from the leg or arc, to starboard of it positive
     cross_track: Number = 0.0
-    course: Number = 0.0
-    roll: Number = 0.0
-    roll_rate: Number = 0.0
-    shaft_speed: Number = 0.0
+    course: Number = 0.0  # rad, over ground, clockwise from north
+    roll: Number = 0.0  # rad, heel
+    roll_rate: Number = 0.0  # rad/s, of heel
+    shaft_speed: Number = 0.0  # 1/s, measured
+    # m, along the path to where the next turn begins; negative on its arc
     next_turn_distance: Number = 0.0
+    # rad, change of course that is left of it, to starboard positive
     next_turn_angle: Number = 0.0
+    # m, along the path to where the turn after that begins
     second_turn_distance: Number = 0.0
+    # rad, change of course there, to starboard positive
     second_turn_angle: Number = 0.0
 
 
-#: What an autopilot may read, with the fields of `BridgeInput`.
-AUTOPILOT_INPUTS: Variables = {
-    "set_point": Variable(
-        "rad",
-        "heading to steer, clockwise from north; of guidance the direction of the path"
-        " beside the ship",
-    ),
-    "heading": Variable("rad", "clockwise from north"),
-    "yaw_rate": Variable("rad/s", "to starboard positive"),
-    "sway": Variable("m/s", "through the water, to starboard positive"),
-    "surge": Variable("m/s", "through the water"),
-    "rudder": Variable("rad", "measured angle, to starboard positive"),
-    "cross_track": Variable(
-        "m", "distance from the leg or arc, to starboard of it positive"
-    ),
-    "course": Variable("rad", "over ground, clockwise from north"),
-    "roll": Variable("rad", "heel"),
-    "roll_rate": Variable("rad/s", "of heel"),
-    "shaft_speed": Variable("1/s", "measured"),
-    "next_turn_distance": Variable(
-        "m", "along the path to where the next turn begins; negative on its arc"
-    ),
-    "next_turn_angle": Variable(
-        "rad", "change of course that is left of it, to starboard positive"
-    ),
-    "second_turn_distance": Variable(
-        "m", "along the path to where the turn after that begins"
-    ),
-    "second_turn_angle": Variable(
-        "rad", "change of course there, to starboard positive"
-    ),
-}
-
+AUTOPILOT_INPUTS = variables_of(BridgeInput)
 #: Answer of an autopilot.
 AUTOPILOT_OUTPUTS: Variables = {
     "order": Variable("rad", "ordered rudder, to starboard positive"),
@@ -199,6 +174,7 @@ def heading_order(
         rudder=given.rudder,
         heading_error_integral=integral,
         surge=given.surge,
+        last_order=state.last_command,
     )
     order, memory = law(seen, state.memory, p.law)
     return order, state._replace(integral=integral, memory=memory)

@@ -1,10 +1,12 @@
 """Controllers and learned policies as C99: laws translated, networks as tables."""
 
+from itertools import repeat
 from typing import Any
 
 from agents.controllers.controller import Controller
 from agents.controllers.guided import Guided
 from agents.controllers.law import Nothing
+from agents.controllers.memory import from_columns
 from agents.controllers.registry import controller_class, controller_kinds
 from agents.export.autopilot import (
     AUTOPILOT_INPUTS,
@@ -22,20 +24,16 @@ from agents.export.autopilot import (
     path_step,
     policy_observations,
 )
-from agents.export.c_expression import Translated
-from agents.export.c_structures import (
-    kind_of,
-    leaf_paths,
-    numbers_of,
-    record_kind,
-)
-from agents.export.c_syntax import Kind, comment
+from agents.export.c_structures import leaf_paths
+from agents.export.c_syntax import comment
 from agents.export.source import Source, c_source, checked_name, hash_text, render
-from agents.export.translator import Translator
+from agents.export.translator import Translated, Translator
 from agents.policies.policy import ORDERS, LearnedPolicy, combined
 from shipgym import InputError
 from shipgym.checks import quoted
 from shipgym.envs.pace import toward
+
+NO_INPUT = BridgeInput(0.0, 0.0)
 
 
 def autopilot_source(agent: Any, name: str | None = None) -> Source:
@@ -58,7 +56,7 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
         "inputs": inputs,
         "interval": p.dt,
         "limit": p.limit,
-        "given_type": c.structures.type(BridgeInput),
+        "given_type": c.structures.type(c.structures.kind_of(NO_INPUT)),
         "structures": c.structures.texts,
         "functions": c.functions,
     }
@@ -78,29 +76,17 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
 def controller_data(c: Translator, agent: Any, p: BridgeParameters) -> dict[str, Any]:
     """Data of the templates for a controller."""
     structures = c.structures
-    state = state_kind(agent)
-    kind, header = declared(c, p, own=state)
-    step = steering_step(c, agent, state, kind, path_step)
+    state = first_state(agent)
+    header = structures.declared(own=state, parameters=p)
+    step = steering_step(c, agent, state, p, path_step)
     return {
         "policy": None,
         "state_structures": header,
-        "state_paths": leaf_paths(state, "own."),
+        "state_paths": list(leaf_paths(state, "own.")),
         "step": step.name,
         "step_type": structures.type(step.returns),
-        "parameters": structures.initialiser(kind, numbers_of(p)),
+        "parameters": structures.initialiser(p),
     }
-
-
-def declared(
-    c: Translator, p: BridgeParameters, **states: Kind
-) -> tuple[Kind, list[str]]:
-    """Kind of the parameters, and the structures of the header, states among them."""
-    structures = c.structures
-    kind = kind_of(p)
-    for ending, part in {**states, "parameters": kind}.items():
-        structures.declare(part, f"{structures.prefix}_{ending}")
-    header, structures.texts = structures.texts, []
-    return kind, header
 
 
 def policy_data(
@@ -111,14 +97,14 @@ def policy_data(
     own = bridge_state(Nothing, Nothing)
     states = {"own": own}
     if policy.base is not None:
-        states["base"] = state_kind(policy.base)
-    kind, header = declared(c, p, **states)
+        states["base"] = first_state(policy.base)
+    header = structures.declared(**states, parameters=p)
 
-    state_paths = []
-    for name, part in states.items():
-        state_paths += leaf_paths(part, f"{name}.")
-    observe = c.function(policy_observations, BridgeInput, own, kind)
-    finish = c.function(limited, float, own, kind)
+    observe = c.function(policy_observations, NO_INPUT, own, p)
+    finish = c.function(limited, 0.0, own, p)
+    state_paths: list[str] = []
+    for name, state in states.items():
+        state_paths += leaf_paths(state, f"{name}.")
     data = {
         "policy": policy,
         "state_structures": header,
@@ -126,38 +112,37 @@ def policy_data(
         "state_paths": state_paths,
         "observe": observe.name,
         "observe_type": structures.type(observe.returns),
-        "own_observations_type": structures.type(OwnObservations),
+        "own_observations_type": structures.type(observe.returns.kinds[0]),
         "finish": finish.name,
         "step_type": structures.type(finish.returns),
         "rows": observation_rows(policy),
         "activations": layer_activations(policy),
         "orders": ORDERS,
-        "parameters": structures.initialiser(kind, numbers_of(p)),
+        "parameters": structures.initialiser(p),
     }
     if policy.action != "rudder-discrete":
-        data["toward"] = c.function(toward, float, float, float).name
+        data["toward"] = c.function(toward, 0.0, 0.0, 0.0).name
     if policy.base is not None:
-        step = steering_step(c, policy.base, states["base"], kind, base_path_step)
-        data["combined"] = c.function(combined, float, float, float).name
+        step = steering_step(c, policy.base, states["base"], p, base_path_step)
+        data["combined"] = c.function(combined, 0.0, 0.0, 0.0).name
         data["base_step"] = step.name
         data["base_step_type"] = structures.type(step.returns)
     return data
 
 
 def steering_step(
-    c: Translator, agent: Any, state: Kind, parameters: Kind, along_path: Any
+    c: Translator, agent: Any, state: BridgeState, p: BridgeParameters, along_path: Any
 ) -> Translated:
     """Write one step of a controller, of guidance the function `along_path`."""
-    kinds = (BridgeInput, state, parameters)
     law = agent.law
     if not isinstance(agent, Guided):
-        return c.function(heading_step, *kinds, law)
+        return c.function(heading_step, NO_INPUT, state, p, law)
     pilot: Any = agent.autopilot
-    return c.function(along_path, *kinds, law, pilot.law)
+    return c.function(along_path, NO_INPUT, state, p, law, pilot.law)
 
 
-def state_kind(agent: Any) -> Kind:
-    """Kind of what a controller remembers; InputError if it has no closed-form law."""
+def first_state(agent: Any) -> BridgeState:
+    """Memory of a controller at the beginning; InputError without a law for C."""
     check_closed_form(agent)
     if not isinstance(agent, Guided):
         return bridge_state(agent.memory_record, Nothing)
@@ -166,11 +151,10 @@ def state_kind(agent: Any) -> Kind:
     return bridge_state(pilot.memory_record, agent.memory_record)
 
 
-def bridge_state(memory: Kind, guidance: Kind) -> Kind:
-    """Record of what an autopilot on a bridge remembers."""
-    numbers = dict.fromkeys(("integral", "last_command", "started"), float)
-    kinds = {**numbers, "memory": memory, "guidance": guidance}
-    return record_kind(BridgeState.__name__, kinds, noted=BridgeState)
+def bridge_state(memory: Any, guidance: Any) -> BridgeState:
+    """What an autopilot on a bridge remembers when it is switched on."""
+    law, guide = (from_columns(one, repeat(0.0)) for one in (memory, guidance))
+    return BridgeState(0.0, 0.0, 0.0, law, guide)
 
 
 def check_closed_form(part: Any) -> None:

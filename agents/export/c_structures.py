@@ -4,14 +4,13 @@ import inspect
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache
-from itertools import islice
+from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from agents.export.c_syntax import NUMBERS, Kind, comment, literal, members
-from shipgym.engine.records import field_types, is_record, is_table, table_of
+from agents.export.c_syntax import c_name, comment, literal
+from shipgym.engine.records import field_types, is_record
 
 
 class Label(NamedTuple):
@@ -26,6 +25,30 @@ class Label(NamedTuple):
         return f" /* {comment(self.note)} */" if self.note else ""
 
 
+class Rows(NamedTuple):
+    """Kind of a table of so many numbers."""
+
+    n: int
+
+
+class Struct(NamedTuple):
+    """Kind of a record or a tuple."""
+
+    record: Any
+    labels: tuple[Label, ...]
+    kinds: tuple[Any, ...]  # float, bool, Rows, Struct, or a function
+
+    @property
+    def name(self) -> str:
+        """Name of the record."""
+        n = len(self.kinds)
+        return self.record.__name__ if is_record(self.record) else f"Tuple{n}"
+
+    def made(self, values: Any) -> Any:
+        """A record, or tuple, of values."""
+        return self.record(*values) if is_record(self.record) else tuple(values)
+
+
 @dataclass
 class Structures:
     """Structures that have been written, under names that begin with `prefix`.
@@ -34,8 +57,7 @@ class Structures:
     ----------
     prefix : str
     types : dict
-        Names of structures by record or tuple of kinds; those that are given are
-        declared elsewhere.
+        Names of structures by kind.
     texts : list of str
         Declarations in an order in which C can read them.
     labels : dict
@@ -43,86 +65,104 @@ class Structures:
     """
 
     prefix: str
-    types: dict[Kind, str] = field(default_factory=dict)
+    types: dict[Struct, str] = field(default_factory=dict)
     texts: list[str] = field(default_factory=list)
-    labels: dict[Kind, Mapping[str, Label]] = field(default_factory=dict)
+    labels: dict[Any, Mapping[str, Label]] = field(default_factory=dict)
     taken: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         public = ("init", "step", "state", "input", "parameters")
         self.taken |= {f"{self.prefix}_{ending}" for ending in public}
 
-    def type(self, kind: Kind) -> str:
+    def kind_of(self, value: Any) -> Any:
+        """Kind of a value: of a number, an array, a record, or a function itself."""
+        if isinstance(value, FunctionType):
+            return value
+        if hasattr(value, "writer"):  # a node, or a function that is called
+            return value.kind
+        if isinstance(value, np.ndarray):
+            return Rows(len(value))
+        if isinstance(value, tuple):
+            kinds = tuple([self.kind_of(part) for part in value])
+            return Struct(type(value), self._labels_of(value), kinds)
+        if isinstance(value, bool | np.bool_):
+            return bool
+        if isinstance(value, int | float | np.number):
+            return float
+        raise TypeError(f"expected numbers and records of them, got {value!r}")
+
+    def _labels_of(self, value: Any) -> tuple[Label, ...]:
+        record = type(value)
+        if record in self.labels:
+            return tuple(self.labels[record].values())
+        if not is_record(record):
+            return tuple([Label(f"v{i}") for i in range(len(value))])
+        notes = field_notes(record)
+        return tuple([Label(c_name(one), notes.get(one, "")) for one in record._fields])
+
+    def type(self, kind: Any) -> str:
         """C type of a kind; a structure is written when it is first needed."""
-        if kind in NUMBERS:
-            return NUMBERS[kind]
-        if is_table(kind):
-            return "const double *"
+        if not isinstance(kind, Struct):
+            numbers = {float: "double", bool: "bool"}
+            return numbers.get(kind, "const double *")
         if kind not in self.types:
-            base = kind.__name__ if is_record(kind) else f"Tuple{len(kind)}"
-            self.declare(kind, self.free_name(base))
+            self.declare(kind, self.free_name(kind.name))
         return self.types[kind]
 
-    def declare(self, kind: Kind, name: str) -> None:
+    def declare(self, kind: Struct, name: str) -> None:
         """Write the structure of a record or a tuple under a name."""
-        declared = []
-        for member, member_kind in members(kind).items():
-            label = self.label(kind, member)
-            declared.append(f"{self.type(member_kind)} {label.name};{label.after_name}")
+        if kind in self.types:
+            self.texts.append(f"typedef {self.types[kind]} {name};\n")
+            return
+        declared = [
+            f"{self.type(part)} {label.name};{label.after_name}"
+            for label, part in zip(kind.labels, kind.kinds, strict=True)
+        ]
         # C has no structure without members
         inside = "\n    ".join(declared or ["int nothing;"])
         self.types[kind] = name
         self.texts.append(f"typedef struct {{\n    {inside}\n}} {name};\n")
 
-    def label(self, kind: Kind, member: str) -> Label:
-        """Name of a member in C, and a note on what it is."""
-        if kind in self.labels:
-            return self.labels[kind][member]
-        return Label(member, field_notes(kind).get(member, ""))
+    def declared(self, **values: Any) -> list[str]:
+        """Structures of values under the prefix and these names, for a header."""
+        for ending, value in values.items():
+            self.declare(self.kind_of(value), f"{self.prefix}_{ending}")
+        header, self.texts = self.texts, []
+        return header
 
-    def constant_label(self, kind: Kind, member: str) -> Label:
-        """Name and note of a member of a constant.
+    def initialiser(self, value: Any, name: str = "value", indent: str = "") -> str:
+        """Initialiser of a value, one number a line; tables become arrays."""
+        if isinstance(value, np.ndarray):
+            array = self.free_name(name)
+            inside = ",\n    ".join([literal(one) for one in value.tolist()])
+            head = f"static const double {array}[{len(value)}]"
+            self.texts.append(f"{head} = {{\n    {inside},\n}};\n")
+            return array
+        if not isinstance(value, tuple):
+            return literal(value)
+
+        deeper = f"{indent}    "
+        lines = []
+        labels = self._labels_of(value)
+        for part, label, after in zip(value, labels, self._units(value), strict=True):
+            shown = self.initialiser(part, label.name, deeper)
+            lines.append(f"{deeper}.{label.name} = {shown},{after}\n")
+        inside = "".join(lines) or f"{deeper}0\n"
+        return f"{{\n{inside}{indent}}}"
+
+    def _units(self, value: Any) -> list[str]:
+        """Comments behind the members of a constant.
 
         A record of what is measured, as a row of a matrix, has a coefficient for each
         of its members, whose unit is another.
         """
-        label = self.label(kind, member)
-        is_coefficient = kind not in self.labels and is_record(kind)
-        if is_coefficient and field_types(kind).get(member) is Any:
-            return Label(label.name)
-        return label
-
-    def initialiser(
-        self,
-        kind: Kind,
-        numbers: Iterator[float],
-        name: str = "value",
-        indent: str = "",
-    ) -> str:
-        """Initialiser by numbers in order, one line each; tables become arrays."""
-        if kind in NUMBERS:
-            return literal(next(numbers))
-        if is_table(kind):
-            return self._array(
-                [literal(one) for one in islice(numbers, kind.rows)], name
-            )
-
-        deeper = f"{indent}    "
-        lines = []
-        for member, member_kind in members(kind).items():
-            label = self.constant_label(kind, member)
-            value = self.initialiser(member_kind, numbers, label.name, deeper)
-            lines.append(f"{deeper}.{label.name} = {value},{label.after_name}\n")
-        inside = "".join(lines) or f"{deeper}0\n"
-        return f"{{\n{inside}{indent}}}"
-
-    def _array(self, literals: list[str], name: str) -> str:
-        """Declare an array and return its name."""
-        array = self.free_name(name)
-        inside = ",\n    ".join(literals)
-        head = f"static const double {array}[{len(literals)}]"
-        self.texts.append(f"{head} = {{\n    {inside},\n}};\n")
-        return array
+        record: Any = type(value)
+        notes = [label.after_name for label in self._labels_of(value)]
+        if record in self.labels or not is_record(record):
+            return notes
+        kinds = field_types(record).values()
+        pairs = zip(notes, kinds, strict=True)
+        return ["" if kind is Any else note for note, kind in pairs]
 
     def free_name(self, name: str) -> str:
         """A name with the prefix that is not taken yet, with a number if need be."""
@@ -136,17 +176,15 @@ class Structures:
         return free
 
 
-@cache
 def field_notes(record: Any) -> dict[str, str]:
     """Comments by the fields of a record: those beside a field, or on lines before it.
 
     Empty for a record whose definition is not at hand.
     """
     try:
-        source = inspect.getsource(getattr(record, "noted", record))
+        source = inspect.getsource(record)
     except (OSError, TypeError):
         return {}
-
     notes = {}
     before: list[str] = []
     for line in source.splitlines():
@@ -161,45 +199,11 @@ def field_notes(record: Any) -> dict[str, str]:
     return notes
 
 
-def kind_of(value: Any) -> Kind:
-    """Kind of a record's value, with tables of the lengths that its arrays have."""
-    if isinstance(value, np.ndarray):
-        return table_of(len(value))
-    if not isinstance(value, tuple):
-        return float
-    record: Any = type(value)
-    kinds = {
-        name: kind_of(part) for name, part in zip(record._fields, value, strict=True)
-    }
-    if list(kinds.values()) == list(members(record).values()):
-        return record
-    return record_kind(record.__name__, kinds, noted=record)
-
-
-def record_kind(name: str, kinds: Mapping[str, Kind], noted: Kind = None) -> Kind:
-    """A record of fields of these kinds, with the notes that another record has."""
-    make: Any = NamedTuple
-    record = make(name, list(kinds.items()))
-    record.noted = noted or record
-    return record
-
-
-def leaf_paths(kind: Kind, before: str = "") -> list[str]:
+def leaf_paths(value: Any, before: str = "") -> Iterator[str]:
     """Paths of all numbers of a record, such as `law.gains.sway`."""
-    paths = []
-    for name, part in members(kind).items():
-        path = f"{before}{name}"
-        if is_record(part):
-            paths += leaf_paths(part, f"{path}.")
-        elif part in NUMBERS:
-            paths.append(path)
-    return paths
-
-
-def numbers_of(value: Any) -> Iterator[float]:
-    """Numbers of a record and of the records and arrays in it, in order."""
-    for one in value:
-        if isinstance(one, tuple | np.ndarray):
-            yield from numbers_of(one)
+    for name, part in value._asdict().items():
+        path = f"{before}{c_name(name)}"
+        if isinstance(part, tuple):
+            yield from leaf_paths(part, f"{path}.")
         else:
-            yield float(one)
+            yield path

@@ -1,18 +1,14 @@
-"""Words of C99: types, operators, expressions, numbers and names."""
+"""Words of C99: functions, numbers, names, comments."""
 
-import ast
 import math
 import re
 import unicodedata
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
+
+import numpy as np
 
 from shipgym import InputError
-from shipgym.engine.records import field_types, is_record
-
-#: float, int, bool, a record, a table, a tuple of kinds, or a function.
-Kind: TypeAlias = Any
-NUMBERS: dict[Kind, str] = {float: "double", int: "int", bool: "bool"}
+from shipgym.engine import mathematics
 
 KEYWORDS = frozenset(
     re.findall(
@@ -23,67 +19,61 @@ KEYWORDS = frozenset(
     )
 )
 
-OPERATORS: dict[type[ast.AST], str] = {
-    ast.Add: "+",
-    ast.Sub: "-",
-    ast.Mult: "*",
-    ast.Div: "/",
-    ast.Lt: "<",
-    ast.LtE: "<=",
-    ast.Gt: ">",
-    ast.GtE: ">=",
-    ast.Eq: "==",
-    ast.NotEq: "!=",
-    ast.And: "&&",
-    ast.Or: "||",
-    ast.BitAnd: "&&",
-    ast.BitOr: "||",
+#: Operators of C by the functions of NumPy that Python's operators call.
+OPERATORS: dict[Any, str] = {
+    np.add: "+",
+    np.subtract: "-",
+    np.multiply: "*",
+    np.true_divide: "/",
+    np.less: "<",
+    np.less_equal: "<=",
+    np.greater: ">",
+    np.greater_equal: ">=",
+    np.equal: "==",
+    np.not_equal: "!=",
+    np.bitwise_and: "&&",
+    np.bitwise_or: "||",
+    np.negative: "-",
+    np.invert: "!",
 }
+LOGIC = ("&&", "||", "!")
+COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 
+#: Functions that C has, or that `templates/prelude.c.j2` gives it.
+FUNCTIONS: dict[Any, str] = {
+    abs: "fabs",
+    math.fabs: "fabs",
+    np.absolute: "fabs",
+    np.minimum: "least",
+    np.maximum: "largest",
+    np.clip: "clip",
+    np.sign: "sign",
+    np.remainder: "modulo",
+    np.power: "pow",
+    math.pow: "pow",
+    mathematics.power_of_bits: "power_of_bits",
+}
+for _name in ("asin", "acos", "atan", "atan2"):
+    FUNCTIONS[getattr(math, _name)] = _name
+    FUNCTIONS[getattr(np, _name.replace("a", "arc", 1))] = _name
+for _name in (
+    *("sqrt", "copysign", "sin", "cos", "tan", "tanh", "exp", "log"),
+    *("hypot", "floor", "ceil", "radians"),
+):
+    FUNCTIONS[getattr(math, _name)] = FUNCTIONS[getattr(np, _name)] = _name
 
-@dataclass(frozen=True)
-class Expression:
-    """An expression of C; `is_atom`: whether it needs no brackets as an operand."""
-
-    text: str
-    kind: Kind
-    is_atom: bool = True
-
-    @property
-    def operand(self) -> str:
-        """Its text beside an operator."""
-        return self.text if self.is_atom else f"({self.text})"
-
-
-def joined(operands: list[Expression], operator: ast.AST, kind: Kind) -> Expression:
-    """Operands with an operator between them."""
-    sign = OPERATORS[type(operator)]
-    text = f" {sign} ".join([operand.operand for operand in operands])
-    return Expression(text, kind, is_atom=False)
-
-
-def choice(test: Expression, yes: Expression, no: Expression) -> Expression:
-    """One of two expressions, as a condition says."""
-    kind = no.kind if yes.kind is int else yes.kind
-    text = f"{test.operand} ? {yes.operand} : {no.operand}"
-    return Expression(text, kind, is_atom=False)
-
-
-def stored_kind(kind: Kind) -> Kind:
-    """Kind of a variable that holds a value; an integer may become any other number."""
-    return float if kind is int else kind
+#: Names that a variable must not have.
+TAKEN = KEYWORDS | {"whole_power", "interpolated", "within", *FUNCTIONS.values()}
 
 
 def literal(value: float) -> str:
     """A number as C writes it, with all its digits."""
-    if isinstance(value, bool | int):
-        text = repr(int(value))
-    elif math.isnan(value):
-        text = "NAN"
-    elif math.isinf(value):
-        text = "HUGE_VAL" if value > 0 else "-HUGE_VAL"
-    else:
-        text = repr(float(value))  # the shortest digits that give the same number
+    if isinstance(value, bool | np.bool_):
+        return "true" if value else "false"
+    if math.isnan(value):
+        return "NAN"
+    text = repr(float(value))  # the shortest digits that give the same number
+    text = text.replace("inf", "HUGE_VAL")
     return f"({text})" if text.startswith("-") else text
 
 
@@ -111,12 +101,3 @@ def c_name(name: str) -> str:
     if not name.isascii():
         raise InputError(f"name: expected ASCII letters, as C has them, got {name!r}")
     return f"{name}_" if name in KEYWORDS else name
-
-
-def members(kind: Kind) -> dict[str, Kind]:
-    """Names and kinds in a record or a tuple; what may be anything is a float."""
-    if is_record(kind):
-        named = list(field_types(kind).items())
-    else:
-        named = [(f"v{i}", part) for i, part in enumerate(kind)]
-    return {c_name(name): float if part is Any else part for name, part in named}

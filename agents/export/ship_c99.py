@@ -1,21 +1,22 @@
 """Ship models as C99, translated from the functions that the environments compile."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from agents.controllers.interface import model_hash
-from agents.export.c_structures import Label, leaf_paths, record_kind
+from agents.controllers.memory import from_columns
+from agents.export.c_structures import Label, leaf_paths
 from agents.export.c_syntax import comment
 from agents.export.source import (
     Source,
-    Variable,
     Variables,
     c_source,
     checked_name,
     render,
+    variables_of,
 )
 from agents.export.translator import Translator
 from shipgym import InputError, ShipModel, Weather, Wind
@@ -29,41 +30,28 @@ from shipgym.sea.weather_column import CALM, weather_column
 from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.term_functions import speed_power
 
-#: Given to an exported ship, held over a step.
-SHIP_INPUTS: Variables = {
-    "rudder": Variable("rad", "rudder order, to starboard positive"),
-    "shaft": Variable("1/s", "ordered shaft speed"),
-    "current_north": Variable("m/s", "current"),
-    "current_east": Variable("m/s", "current"),
-    "wind_speed": Variable("m/s", "10 m above the sea; 0: no wind forces"),
-    "wind_from": Variable("rad", "direction the wind comes from"),
-}
-
-#: State of an exported ship, with the fields of `Motion`.
-SHIP_STATES: Variables = {
-    "x": Variable("m", "north"),
-    "y": Variable("m", "east"),
-    "psi": Variable("rad", "heading"),
-    "u": Variable("m/s", "surge"),
-    "v": Variable("m/s", "sway"),
-    "r": Variable("rad/s", "yaw rate"),
-    "p": Variable("rad/s", "roll rate"),
-    "phi": Variable("rad", "heel"),
-    "q": Variable("rad/s2", "memory of yaw"),
-    "delta": Variable("rad", "rudder angle"),
-    "n": Variable("1/s", "shaft speed"),
-}
-
 
 class ShipInput(NamedTuple):
-    """Input of a ship, held over a step (`SHIP_INPUTS`)."""
+    """Input of a ship, held over a step."""
 
-    rudder: float
-    shaft: float
-    current_north: float
-    current_east: float
-    wind_speed: float
-    wind_from: float
+    rudder: float  # rad, rudder order, to starboard positive
+    shaft: float  # 1/s, ordered shaft speed
+    current_north: float  # m/s, current
+    current_east: float  # m/s, current
+    wind_speed: float  # m/s, 10 m above the sea; 0: no wind forces
+    wind_from: float  # rad, direction the wind comes from
+
+
+SHIP_INPUTS = variables_of(ShipInput)
+SHIP_STATES = variables_of(Motion)
+
+
+class Parameters(NamedTuple):
+    """Constants of a ship."""
+
+    ship: Ship
+    coefficients: Any
+    sea: SeaParameters
 
 
 def advance(
@@ -116,7 +104,12 @@ def ship_source(
     name = checked_name(name or model.name)
     longest = LONGEST_STEP * model.travel_time
     weather, note = _weather(model, water_depth)
-    numbers = [*model.ship_numbers(water_depth, longest), *weather]
+    numbers = iter([*model.ship_numbers(water_depth, longest), *weather])
+    p = Parameters(
+        ship=from_columns(Ship, numbers),
+        coefficients=from_columns(model.compiled.coefficients, numbers),
+        sea=from_columns(SeaParameters, numbers),
+    )
     without = {"wind_speed", "wind_from"} if note else set()
     if "n" not in model.command_names:
         without.add("shaft")
@@ -125,14 +118,6 @@ def ship_source(
     outputs = _started(model, shown, SHIP_STATES)
     c = Translator({**model.compiled.hooks(), **OPEN_SEA.functions}, name)
     c.structures.labels |= coefficient_labels(model)
-    kind = record_kind(
-        "Parameters",
-        {
-            "ship": Ship,
-            "coefficients": model.compiled.coefficients,
-            "sea": SeaParameters,
-        },
-    )
     title = f"Ship model '{model.name}'"
     data = {
         "title": comment(title),
@@ -145,7 +130,7 @@ def ship_source(
         "speed": model.particulars["speed"],
         "shaft": _start(model)["shaft"],
         "limit": model.steering.limit,
-        **_translated(c, model, kind, numbers),
+        **_translated(c, model, p),
     }
     return Source(
         name=name,
@@ -161,39 +146,23 @@ def ship_source(
     )
 
 
-def _translated(
-    c: Translator, model: ShipModel, kind: Any, numbers: Sequence[float]
-) -> dict[str, Any]:
-    """Functions and structures of a ship in C, for the templates.
-
-    `numbers`: those of the ship, her coefficients and her sea, in order.
-    """
+def _translated(c: Translator, model: ShipModel, p: Parameters) -> dict[str, Any]:
+    """Functions and structures of a ship in C, for the templates."""
     structures = c.structures
-    prefix = structures.prefix
-    structures.types |= {Motion: f"{prefix}_state", ShipInput: f"{prefix}_input"}
-    structures.declare(kind, f"{prefix}_parameters")
-    header, structures.texts = structures.texts, []
-    parameters = structures.initialiser(kind, iter(numbers))
-
-    coefficients = model.compiled.coefficients
-    step = c.function(
-        advance,
-        Motion,
-        ShipInput,
-        float,
-        coefficients,
-        Ship,
-        SeaParameters,
-    )
-    has_lost = c.function(lost, Motion, Ship)
-
     start = _start(model)
-    at_start = [start.get(state, 0.0) for state in Motion._fields]
+    begin = Motion(*[start.get(state, 0.0) for state in Motion._fields])
+    given = ShipInput(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for ending, value in (("state", begin), ("input", given)):
+        structures.types[structures.kind_of(value)] = f"{structures.prefix}_{ending}"
+    header = structures.declared(parameters=p)
+    parameters = structures.initialiser(p)
+    step = c.function(advance, begin, given, 0.0, p.coefficients, p.ship, p.sea)
+    has_lost = c.function(lost, begin, p.ship)
     return {
-        "begin": structures.initialiser(Motion, iter(at_start)),
+        "begin": structures.initialiser(begin),
         "parameters": parameters,
         "parameter_structures": header,
-        "state_paths": leaf_paths(Motion),
+        "state_paths": list(leaf_paths(begin)),
         "structures": structures.texts,
         "functions": c.functions,
         "advance": step.name,

@@ -10,6 +10,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 import shipgym
+from agents.export.c_structures import field_notes
 from agents.export.c_syntax import KEYWORDS, comment, literal
 from shipgym import InputError
 
@@ -30,6 +31,15 @@ class Variable(NamedTuple):
 
 
 Variables = Mapping[str, Variable]
+
+
+def variables_of(record: Any) -> Variables:
+    """Variables with units and meanings as they stand beside a record's fields."""
+    found = {}
+    for name, note in field_notes(record).items():
+        unit, _, meaning = note.partition(", ")
+        found[name] = Variable(unit.replace("^", ""), meaning)
+    return found
 
 
 @dataclass(frozen=True)

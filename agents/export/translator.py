@@ -1,22 +1,46 @@
 """Plain functions on numbers and records, as the engine compiles them, written as C99.
 
-A function is translated for the kinds of its arguments, with all that it calls, hooks
-filled as `shipgym.engine.specialise` fills them. Only checked names and numbers become
-part of the C.
+A function is run on nodes in place of numbers, once for each way through its branches:
+what it computes of them is its C. It is written for the kinds of its arguments, with
+all that it calls, hooks filled as `shipgym.engine.specialise` fills them. Only checked
+names and numbers become part of the C.
 """
 
-import ast
 import inspect
+import sys
 import textwrap
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from types import FunctionType
-from typing import Any
+import traceback
+from collections import Counter
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from functools import partial, reduce
+from types import FunctionType, ModuleType
+from typing import Any, NamedTuple
 
-from agents.export.c_expression import ExpressionWriter, Translated, as_real
-from agents.export.c_library import variable_name
-from agents.export.c_structures import Structures
-from agents.export.c_syntax import Expression, Kind, comment, members, stored_kind
+import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
+
+from agents.export.c_structures import Rows, Struct, Structures
+from agents.export.c_syntax import (
+    COMPARISONS,
+    FUNCTIONS,
+    LOGIC,
+    OPERATORS,
+    TAKEN,
+    comment,
+    literal,
+)
+from shipgym import InputError
+from shipgym.engine.records import row_of
 from shipgym.engine.specialise import named_globals
+
+MOST_WAYS = 128  # through the branches of one function, and conditions on each
+
+
+class Translated(NamedTuple):
+    """A function that was written as C."""
+
+    name: str
+    returns: Any  # kind
 
 
 class Translator:
@@ -32,237 +56,422 @@ class Translator:
     Attributes
     ----------
     structures : Structures
-    functions : list of str
-        Definitions in an order in which C can read them.
     """
 
     def __init__(self, hooks: Mapping[str, Any], prefix: str) -> None:
         self.hooks = hooks
         self.structures = Structures(prefix)
-        self.functions: list[str] = []
+        self._texts: dict[str, str] = {}  # by name, in an order that C can read
+        self._wanted: set[str] = set()
         # None while a function is being written
-        self._translated: dict[Any, Translated | None] = {}
+        self._written: dict[Any, Translated | None] = {}
 
-    def function(self, function: Any, *kinds: Kind) -> Translated:
-        """Write a function for arguments of these kinds, functions among them.
+    @property
+    def functions(self) -> list[str]:
+        """Definitions of the functions that were asked for, and of what they call."""
+        kept: list[str] = []
+        for name, text in reversed(self._texts.items()):
+            if name in self._wanted or any(f"{name}(" in other for other in kept):
+                kept.append(text)
+        return kept[::-1]
+
+    def function(self, function: Any, *values: Any) -> Translated:
+        """Write a function for arguments such as these values, functions among them.
 
         Raises InputError, naming function and line, for what cannot be written as C.
         """
-        translated = self.call(function, *kinds)
-        assert translated is not None, "only a function that is being written is open"
-        return translated
+        found = self.call(function, *values)
+        self._wanted.add(found.name)
+        return found
 
-    def call(self, function: Any, *kinds: Kind) -> Translated | None:
-        """A function that another one calls; None if it is still being written."""
+    def call(self, function: Any, *values: Any) -> Translated:
+        """Write a function that another one calls."""
+        kinds = tuple([self.structures.kind_of(value) for value in values])
         key = (function, kinds)
-        if key not in self._translated:
-            self._translated[key] = None
+        if key not in self._written:
+            self._written[key] = None
             name = self.structures.free_name(function.__name__)
-            writer = FunctionWriter(
-                function, kinds, self.hooks, self.structures, self.call
-            )
-            text, returns = writer.written(name)
-            self.functions.append(text)
-            self._translated[key] = Translated(name, returns)
-        return self._translated[key]
+            text, returns = FunctionWriter(self, function, kinds).written(name)
+            self._texts[name] = text
+            self._written[key] = Translated(name, returns)
+        found = self._written[key]
+        if found is None:
+            raise TypeError("a function that calls itself")
+        return found
+
+
+class Node(NDArrayOperatorsMixin):
+    """A number or a structure in C that is computed of others.
+
+    `text`: in C, with %s for each of the nodes `parts`; `sign`: the operator between
+    them, empty for what needs no brackets.
+    """
+
+    def __init__(self, writer: Any, text: str, parts: tuple[Any, ...], kind: Any):
+        self.writer = writer
+        self.text = text
+        self.parts = parts
+        self.kind = kind
+        self.sign = ""
+        self.hint = ""  # name that it has in Python
+
+    def __bool__(self) -> bool:
+        return bool(self.writer.choose(self))
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any) -> Any:
+        return self.writer.applied(ufunc, *inputs)
+
+    def __array_function__(self, function: Any, _: Any, inputs: Any, more: Any) -> Any:
+        return self.writer.applied(function, *inputs, **more)
+
+
+class Callee(NamedTuple):
+    """A function that is called in C where it is called in Python."""
+
+    kind: Any
+    writer: Any
+
+    def __call__(self, *given: Any, **named: Any) -> Any:
+        """Result of a call in C."""
+        bound = inspect.signature(self.kind).bind(*given, **named)
+        bound.apply_defaults()
+        return self.writer.called(self.kind, list(bound.arguments.values()))
+
+
+class Module(NamedTuple):
+    """A module whose functions are called in C."""
+
+    module: ModuleType
+    writer: Any
+
+    def __getattr__(self, name: str) -> Any:
+        return self.writer.in_c(getattr(self.module, name))
 
 
 class FunctionWriter:
-    """Writes the statements of one function.
+    """Runs a function on nodes, and writes what it returns."""
 
-    `kinds`: of its arguments; a function is its own kind. `translate`: see
-    `ExpressionWriter`.
-    """
+    def __init__(self, c: Translator, function: Any, kinds: Sequence[Any]) -> None:
+        self.c = c
+        self.function = function
+        self.kinds = kinds
+        self.nodes: dict[Any, Node] = {}  # in an order in which C can compute them
+        self.decisions: tuple[bool, ...] = ()
+        self.asked: list[Node] = []  # conditions on this way
+        self.answers: dict[int, bool] = {}
+        self.n_ways = 0
 
-    def __init__(
-        self,
-        function: Any,
-        kinds: Sequence[Kind],
-        hooks: Mapping[str, Any],
-        structures: Structures,
-        translate: Callable[..., Translated | None],
-    ) -> None:
-        self.kinds: dict[str, Kind] = {}
-        self.expressions = ExpressionWriter(
-            place=f"{function.__module__}.{function.__name__}",
-            names=dict(named_globals(function, hooks)),
-            kinds=self.kinds,
-            structures=structures,
-            translate=translate,
-        )
-        tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
-        if not isinstance(tree, ast.FunctionDef):
-            raise self.expressions.refusal(tree)
-        self.summary = (function.__doc__ or "").strip().partition("\n")[0]
-        self.arguments = [argument.arg for argument in tree.args.args]
-        self.kinds |= zip(self.arguments, kinds, strict=True)
-        self.body = pruned(tree.body, self.expressions.constant)
-        self.read = names_in(self.body, ast.Load)
-        self.returns: Kind = None
-        self.n_tuples = 0
-
-    def written(self, name: str) -> tuple[str, Kind]:
+    def written(self, name: str) -> tuple[str, Any]:
         """Text of the function under a name in C, and the kind that it returns."""
-        statements = self._statements(self.body)
-        passed = []  # functions are known at translation
-        for argument in self.arguments:
-            if not isinstance(self.kinds[argument], FunctionType):
-                passed.append(argument)
-        parameters = ", ".join([self._declaration(one) for one in passed])
-        type_name = self.expressions.structures.type(self.returns)
-        lines = [
-            f"/* {comment(self.summary)} */",
-            f"static {type_name} {name}({parameters or 'void'}) {{",
-        ]
-        for variable in self.kinds:
-            if variable not in self.arguments:
-                lines.append(f"    {self._declaration(variable)};")
-        for argument in passed:
-            if argument not in self.read:
-                lines.append(f"    (void){variable_name(argument)};")
-        return "\n".join([*lines, *statements, "}\n"]), self.returns
+        try:
+            names = list(inspect.signature(self.function).parameters)
+            arguments = []
+            for argument, kind in zip(names, self.kinds, strict=True):
+                arguments.append(self._argument(argument, kind))
+            run = partial(self._copy(), *arguments)
+            result = self.folded(self._by_ways(run, ()))
+            returns = self.c.structures.kind_of(result)
+        except InputError:
+            raise
+        except Exception as error:
+            raise self._refusal(error) from error
+        return self._text(name, result), returns
 
-    def _declaration(self, variable: str) -> str:
-        type_name = self.expressions.structures.type(self.kinds[variable])
-        return f"{type_name} {variable_name(variable)}"
+    def _argument(self, name: str, kind: Any) -> Any:
+        if isinstance(kind, FunctionType):
+            return Callee(kind, self)
+        return self.unfolded(self.node(free(name, TAKEN), (), kind))
 
-    def _statements(self, body: Iterable[ast.stmt]) -> list[str]:
+    def _copy(self) -> Callable[..., Any]:
+        """The function, with names for what it calls that write C."""
+        function = self.function
+        names: dict[str, Any] = {
+            "__name__": function.__module__,
+            "min": partial(self._smaller, np.minimum),
+            "max": partial(self._smaller, np.maximum),
+            "int": partial(self.applied, int),
+            "float": partial(self.applied, float),
+        }
+        for name, value in named_globals(function, self.c.hooks):
+            names[name] = self.in_c(value)
+        defaults = function.__defaults__
+        return FunctionType(function.__code__, names, function.__name__, defaults)
+
+    def in_c(self, value: Any) -> Any:
+        """What a global of the function stands for."""
+        if value is row_of:
+            return self._entry
+        if isinstance(value, Hashable) and value in FUNCTIONS:
+            return partial(self.applied, value)
+        if isinstance(value, ModuleType) and value is not np:
+            return Module(value, self)
+        return Callee(value, self) if isinstance(value, FunctionType) else value
+
+    # Ways through branches.
+
+    def _by_ways(self, run: Callable[[], Any], decisions: tuple[bool, ...]) -> Any:
+        """Result of a function whose first conditions are decided so."""
+        self.n_ways += 1
+        self.decisions, self.asked, self.answers = decisions, [], {}
+        result = self._named(run)
+        asked = self.asked
+        for number in reversed(range(len(decisions), len(asked))):
+            before = decisions + (True,) * (number - len(decisions))
+            other = self._by_ways(run, (*before, False))
+            result = self._either(asked[number], result, other)
+        return result
+
+    def choose(self, condition: Node) -> bool:
+        """Decide a condition, the same one always alike on one way."""
+        number = len(self.asked)
+        if max(number, self.n_ways) > MOST_WAYS:
+            raise TypeError("a loop by a condition, or too many branches")
+        if id(condition) not in self.answers:
+            self.asked.append(condition)
+            is_new = number >= len(self.decisions)
+            self.answers[id(condition)] = is_new or self.decisions[number]
+        return self.answers[id(condition)]
+
+    def _either(self, condition: Node, yes: Any, no: Any) -> Any:
+        """One of two results, number by number."""
+        if isinstance(yes, tuple):
+            pairs = zip(yes, no, strict=True)
+            parts = [self._either(condition, a, b) for a, b in pairs]
+            return type(yes)(*parts) if hasattr(yes, "_fields") else tuple(parts)
+        is_constant = not isinstance(yes, Node) and not isinstance(no, Node)
+        if yes is no or (is_constant and yes == no):
+            return yes
+        return self.applied(np.where, condition, yes, no)
+
+    def _named(self, run: Callable[[], Any]) -> Any:
+        """Run, and name nodes as the function's variables."""
+        code = self.function.__code__
+
+        def note(frame: Any, event: str, _: Any) -> None:
+            if event == "return" and frame.f_code is code:
+                for name, value in frame.f_locals.items():
+                    if isinstance(value, Node) and value.parts and not value.hint:
+                        value.hint = name
+
+        before = sys.getprofile()
+        sys.setprofile(note)
+        try:
+            return run()
+        finally:
+            sys.setprofile(before)
+
+    # Nodes.
+
+    def node(self, text: str, parts: Sequence[Any], kind: Any) -> Node:
+        """Node of a text and its parts, the same one for the same; numbers go in."""
+        within = tuple([one for one in parts if isinstance(one, Node)])
+        shown = ["%s" if isinstance(one, Node) else literal(one) for one in parts]
+        text = text % tuple(shown)
+        key = (text, *map(id, within))
+        if key not in self.nodes:
+            self.nodes[key] = Node(self, text, within, kind)
+        return self.nodes[key]
+
+    def applied(self, function: Any, *values: Any, **more: Any) -> Any:
+        """An operator or a function of numbers."""
+        if not any(isinstance(value, Node) for value in values):
+            return function(*values, **more)
+        kinds = {self.c.structures.kind_of(value) for value in values}
+        if function in OPERATORS:
+            return self._operation(OPERATORS[function], values, kinds)
+        if function is np.where:
+            return self._choice(*values)
+        if function is np.interp:
+            n_rows = values[1].kind.n
+            return self.node(f"interpolated(%s, {n_rows}, %s, %s)", values, float)
+        if function is float:
+            return self._choice(values[0], 1.0, 0.0) if kinds == {bool} else values[0]
+        if function is int:
+            return self.node("trunc(%s)", values, float)
+        if kinds != {float} or more:
+            raise TypeError("a function of other than numbers")
+        exponent = values[-1]
+        if function is np.power and isinstance(exponent, int) and exponent > 0:
+            return self.node(f"whole_power(%s, {exponent})", values[:1], float)
+        blanks = ", ".join(["%s"] * len(values))
+        return self.node(f"{FUNCTIONS[function]}({blanks})", values, float)
+
+    def _operation(self, sign: str, values: Sequence[Any], kinds: set[Any]) -> Node:
+        if kinds != {bool if sign in LOGIC else float}:
+            raise TypeError("numbers where conditions are expected, or the reverse")
+        is_condition = sign in LOGIC or sign in COMPARISONS
+        text = f"%s {sign} %s" if len(values) == 2 else f"{sign}%s"
+        made = self.node(text, values, bool if is_condition else float)
+        made.sign = sign if len(values) == 2 else "!"
+        return made
+
+    def _choice(self, test: Any, yes: Any, no: Any) -> Any:
+        if not isinstance(test, Node):
+            return yes if test else no
+        if yes is True and no is False:
+            return test
+        if yes is False and no is True:
+            return self.applied(np.invert, test)
+        kind = self.c.structures.kind_of(yes)
+        made = self.node("%s ? %s : %s", (test, yes, no), kind)
+        made.sign = "?"
+        return made
+
+    def _smaller(self, function: Any, *values: Any) -> Any:
+        return reduce(partial(self.applied, function), values)
+
+    def _entry(self, table: Node, row: Any) -> Node:
+        """Number of a table."""
+        if isinstance(row, Node):
+            return self.node("%s[(int)(%s)]", (table, row), float)
+        return self.node(f"%s[{int(row)}]", (table,), float)
+
+    def called(self, function: Any, values: Sequence[Any]) -> Any:
+        """Call of another function."""
+        written = self.c.call(function, *values)
+        passed = [self.folded(one) for one in values if not isinstance(one, Callee)]
+        blanks = ", ".join(["%s"] * len(passed))
+        made = self.node(f"{written.name}({blanks})", passed, written.returns)
+        return self.unfolded(made)
+
+    def unfolded(self, node: Node) -> Any:
+        """Record of the numbers of a structure; a number as it is."""
+        kind = node.kind
+        if not isinstance(kind, Struct):
+            return node
+        members = []
+        for label, part in zip(kind.labels, kind.kinds, strict=True):
+            member = self.node(f"%s.{label.name}", (node,), part)
+            members.append(self.unfolded(member))
+        return kind.made(members)
+
+    def folded(self, value: Any) -> Any:
+        """Structure of a record; a number as it is."""
+        if not isinstance(value, tuple):
+            return value
+        kind = self.c.structures.kind_of(value)
+        parts = [self.folded(part) for part in value]
+        first = parts[0] if parts else None
+        if isinstance(first, Node) and len(first.parts) == 1:
+            (whole,) = first.parts
+            unfolded = self.unfolded(whole) if whole.kind == kind else ()
+            if unfolded and all(map(same, unfolded, value)):
+                return whole
+        inside = ", ".join([f".{label.name} = %s" for label in kind.labels])
+        text = f"({self.c.structures.type(kind)}){{{inside or 0}}}"
+        return self.node(text, parts, kind)
+
+    # Text.
+
+    def _text(self, name: str, result: Any) -> str:
+        """Definition of the function in C."""
+        structures = self.c.structures
+        uses = self._uses(result)
+        names = {}
+        parameters = []
         lines = []
-        for node in body:
-            lines += [f"    {line}" for line in self._statement(node)]
-        return lines
+        arguments = inspect.signature(self.function).parameters
+        for argument, kind in zip(arguments, self.kinds, strict=True):
+            if isinstance(kind, FunctionType):
+                continue
+            variable = free(argument, TAKEN)
+            gap = "" if isinstance(kind, Rows) else " "
+            parameters.append(f"{structures.type(kind)}{gap}{variable}")
+            node = self.nodes[variable,]
+            names[id(node)] = variable
+            if not uses[id(node)]:
+                lines.append(f"(void){variable};")
 
-    def _statement(self, node: ast.stmt) -> list[str]:
-        match node:
-            case ast.Return(value=ast.expr() as value):
-                result = self.expressions.expression(value)
-                self.returns = stored_kind(result.kind)
-                return [f"return {result.text};"]
-            case ast.If():
-                return self._if(node)
-            case ast.For(
-                target=ast.Name(id=name),
-                iter=ast.Call(func=ast.Name(id="range"), args=[end]),
-                orelse=[],
-            ):
-                return self._for(name, end, node.body)
-            case ast.Assign(targets=[target], value=value):
-                return self._assignment(target, value)
-            case ast.AnnAssign(target=target, value=ast.expr() as value):
-                return self._assignment(target, value)
-        raise self.expressions.refusal(node)
+        taken = {*TAKEN, *names.values()}
+        for node in self.nodes.values():
+            if is_variable(node, uses) and id(node) not in names:
+                declared = structures.type(node.kind)
+                hint = node.hint or getattr(node.kind, "name", "part").lower()
+                variable = free(hint, taken)
+                taken.add(variable)
+                lines.append(f"const {declared} {variable} = {written(node, names)};")
+                names[id(node)] = variable
+        lines.append(f"return {written(result, names)};")
 
-    def _if(self, node: ast.If) -> list[str]:
-        test = self.expressions.expression(node.test)
-        lines = [f"if ({test.text}) {{", *self._statements(node.body)]
-        if node.orelse:
-            lines += ["} else {", *self._statements(node.orelse)]
-        return [*lines, "}"]
+        summary = (self.function.__doc__ or "").strip().partition("\n")[0]
+        returned = structures.type(structures.kind_of(result))
+        head = f"static {returned} {name}({', '.join(parameters) or 'void'}) {{"
+        body = [
+            textwrap.fill(
+                line,
+                width=110,
+                initial_indent="    ",
+                subsequent_indent="        ",
+                break_long_words=False,
+                break_on_hyphens=False,
+            )
+            for line in lines
+        ]
+        above = [f"/* {comment(summary)} */"] if summary else []
+        return "\n".join([*above, head, *body, "}\n"])
 
-    def _for(self, name: str, end: ast.expr, body: Iterable[ast.stmt]) -> list[str]:
-        """A loop over `range(end)`."""
-        self.kinds[name] = int
-        i = variable_name(name)
-        number = self.expressions.expression(end)
-        bound = number.operand
-        if number.kind is float:  # as all sums are
-            bound = f"(int){bound}"
-        head = f"for ({i} = 0; {i} < {bound}; ++{i}) {{"
-        return [head, *self._statements(body), "}"]
+    def _uses(self, result: Any) -> Counter[int]:
+        """How often each node is used for a result."""
+        uses = Counter([id(result)])
+        for node in reversed(self.nodes.values()):
+            if uses[id(node)]:
+                uses.update(map(id, node.parts))
+        return uses
 
-    def _assignment(self, target: ast.expr, value: ast.expr) -> list[str]:
-        match target, value:
-            case ast.Name(id=name), _:
-                return [self._stored(name, self.expressions.expression(value))]
-            case ast.Tuple(elts=targets), _:
-                return self._unpacked(targets, value)
-        raise self.expressions.refusal(target)
-
-    def _unpacked(self, targets: list[ast.expr], value: ast.expr) -> list[str]:
-        """`a, b = f(x)` by a structure."""
-        whole = self.expressions.expression(value)
-        self.n_tuples += 1
-        name = f"tuple_{self.n_tuples}"
-        lines = [self._stored(name, whole)]
-        for target, (part, kind) in zip(
-            targets, members(whole.kind).items(), strict=True
-        ):
-            if not isinstance(target, ast.Name):
-                raise self.expressions.refusal(target)
-            if target.id in self.read:
-                part_of_it = Expression(f"{name}.{part}", kind)
-                lines.append(self._stored(target.id, part_of_it))
-        return lines
-
-    def _stored(self, name: str, value: Expression) -> str:
-        self.kinds[name] = stored_kind(value.kind)
-        return f"{variable_name(name)} = {as_real(value).text};"
+    def _refusal(self, error: Exception) -> InputError:
+        """Message for what cannot be written."""
+        code = self.function.__code__
+        line, said = 1, str(error)
+        for frame in traceback.extract_tb(error.__traceback__):
+            if (frame.filename, frame.name) == (code.co_filename, code.co_name):
+                line = int(frame.lineno or 1) - code.co_firstlineno + 1
+                said = f"{(frame.line or '')[:80]!r} ({error})"
+        return InputError(
+            f"{self.function.__module__}.{self.function.__name__}, line {line}:"
+            " expected arithmetic, comparisons, records and functions made of these,"
+            f" got {said}, which cannot be written as C"
+        )
 
 
-def pruned(body: list[ast.stmt], constant: Callable[[ast.AST], Any]) -> list[ast.stmt]:
-    """Statements that are reached and whose results are read.
-
-    `constant`: value of an expression of constants, by which branches are excluded.
-    """
-    body = reachable(body, constant)
-    read: set[str] = set()
-    while read != names_in(body, ast.Load):
-        read = names_in(body, ast.Load)
-        body = stored(body, read)
-    return body
+def same(a: Any, b: Any) -> bool:
+    """Return True for the same node, or records of the same nodes."""
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        return len(a) == len(b) and all(map(same, a, b))
+    return a is b
 
 
-def reachable(
-    body: Iterable[ast.stmt], constant: Callable[[ast.AST], Any]
-) -> list[ast.stmt]:
-    """Statements without docstrings, excluded branches, and what follows a return."""
-    kept: list[ast.stmt] = []
-    for node in body:
-        known = constant(node.test) if isinstance(node, ast.If) else None
-        if isinstance(node, ast.If) and isinstance(known, bool):
-            kept += reachable(node.body if known else node.orelse, constant)
-        elif not isinstance(node, ast.Expr):
-            if isinstance(node, ast.If | ast.For):
-                node.body = reachable(node.body, constant)
-                node.orelse = reachable(node.orelse, constant)
-            kept.append(Chosen(constant).visit(node))
-        if kept and isinstance(kept[-1], ast.Return):
-            break
-    return kept
+def free(name: str, taken: Any) -> str:
+    """A name that is not taken, with underscores if need be."""
+    while name in taken:
+        name += "_"
+    return name
 
 
-class Chosen(ast.NodeTransformer):
-    """Replaces conditional expressions by what a constant condition chooses."""
-
-    def __init__(self, constant: Callable[[ast.AST], Any]) -> None:
-        self.constant = constant
-
-    def visit_IfExp(self, node: ast.IfExp) -> Any:
-        """See `ast.NodeTransformer`."""
-        known = self.constant(node.test)
-        if isinstance(known, bool):
-            return self.visit(node.body if known else node.orelse)
-        return self.generic_visit(node)
+def is_variable(node: Node, uses: Counter[int]) -> bool:
+    """Return True for a node that is computed once and has a name."""
+    n_uses = uses[id(node)]
+    is_call = isinstance(node.kind, Struct) and node.text[0] not in "(%"
+    is_member = node.text.startswith("%s.") and not node.hint
+    return n_uses > 0 and not is_member and (n_uses > 1 or is_call or bool(node.hint))
 
 
-def stored(body: Iterable[ast.stmt], read: set[str]) -> list[ast.stmt]:
-    """Statements that return, branch or store a name that is read."""
-    kept = []
-    for node in body:
-        if isinstance(node, ast.If | ast.For):
-            node.body = stored(node.body, read)
-            node.orelse = stored(node.orelse, read)
-        has_effect = isinstance(node, ast.Return | ast.If)
-        if has_effect or names_in([node], ast.Store) & read:
-            kept.append(node)
-    return kept
+#: How closely operators bind, where no brackets are needed for the reader.
+BINDING = {"+": 1, "-": 1, "*": 2, "/": 2}
 
 
-def names_in(body: Iterable[ast.AST], context: type[ast.expr_context]) -> set[str]:
-    """Names that are read or written in statements."""
-    names = set()
-    for statement in body:
-        for node in ast.walk(statement):
-            if isinstance(node, ast.Name) and isinstance(node.ctx, context):
-                names.add(node.id)
-    return names
+def written(node: Any, names: Mapping[int, str]) -> str:
+    """Text of a node, of names where it has variables."""
+    if not isinstance(node, Node):
+        return literal(node)
+    if id(node) in names:
+        return names[id(node)]
+    parts = []
+    for place, part in enumerate(node.parts):
+        text = written(part, names)
+        own, inner = BINDING.get(node.sign, 9), BINDING.get(part.sign, 0)
+        is_left = place == 0 and node.text.startswith("%s")
+        is_free = inner > own or (inner == own and is_left)
+        needs_brackets = node.sign and part.sign and not is_free
+        is_named = id(part) in names
+        parts.append(f"({text})" if needs_brackets and not is_named else text)
+    return node.text % tuple(parts)

@@ -1,24 +1,21 @@
-"""Designs in closed loop with the models drawn: judged there, and retuned there.
+"""Designs in closed loop with the models drawn.
 
-A design that loses too many of them is given another bandwidth, the first in a row of
-shares that holds them, before it is refused. A covariance reaches further than the
-trials allow: a model that runs away in a trial that the ship was put through, or
-gathers speed without end on a straight course, does not count, since no autopilot
-steers the speed.
+A covariance reaches further than the trials allow: a model that runs away in a trial
+that the ship was put through, or gathers speed without end on a straight course, does
+not count, since no autopilot steers the speed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from agents.controllers.controller import Controller
-from agents.controllers.designs import with_bandwidth
 from agents.rollouts.course_keeping import Episodes, sail
-from agents.verification.tracks import Track, judged_task, keep_track, track_task
+from agents.verification.tracks import Track, judged_task, keep_track
 from identification.samples.prediction import predict
 from shipgym.arrays import Flags, Integers
 from shipgym.errors import InputError, UnstableModelError
@@ -31,32 +28,21 @@ if TYPE_CHECKING:
 
 #: Share of the models drawn that an autopilot may lose control of.
 MOST_LOST = 0.05
-#: Shares of its bandwidth that a design is tried with, in this order.
-SHARES = (0.7, 0.5, 0.35, 0.25, 1.4)
 
 
 class Held(NamedTuple):
     """A design as it is given, and what came of it."""
 
-    controller: Controller
+    controller: Any
     outcome: Any  # its episodes, or its track
-    share: float = 1.0  # of the bandwidth of the first design
 
     @property
-    def in_words(self) -> str:
-        """How it was retuned."""
-        per_cent = 100.0 * self.share
-        pace = "slower" if self.share < 1.0 else "faster"
-        return f"{pace}, {per_cent:.0f} % of the first design's bandwidth"
-
-
-def in_words(designs: Sequence[Held]) -> dict[str, str]:
-    """How designs were retuned, by their kind; without those that were not."""
-    return {
-        str(held.controller.kind): held.in_words
-        for held in designs
-        if held.share != 1.0
-    }
+    def judged(self) -> tuple[int, float]:
+        """Models that it loses, and the mean cost, of a track the mean error, m."""
+        outcome = self.outcome
+        if isinstance(outcome, Track):
+            return int(np.sum(~outcome.arrived)), float(np.mean(outcome.rms))
+        return int(np.sum(outcome.terminated)), float(np.mean(outcome.cost))
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,63 +71,23 @@ class ClosedLoop:
         """An episode of each model under a heading autopilot."""
         return sail(autopilot, self.draws, judged_task(), self.seeds)
 
-    def keep_courses(
-        self, controllers: Sequence[Controller], episodes: Sequence[Episodes]
-    ) -> list[Held]:
-        """Heading autopilots with their episodes, retuned if they lose too many."""
-        return [
-            self._held(Held(*first), self.sail, lambda outcome: outcome.terminated)
-            for first in zip(controllers, episodes, strict=True)
-        ]
+    def led(self, guide: Controller) -> Track:
+        """Track of the identified model and of the models drawn under a guide."""
+        return keep_track(guide, [self.model, *self.draws])
 
-    def keep_track(self, guide: Controller) -> Held:
-        """A path autopilot with its track on the models that count, likewise."""
-        ships = [self.model, *self.draws]
-
-        def run(other: Controller) -> Track:
-            return keep_track(other, ships)
-
-        held = self._held(Held(guide, run(guide)), run, lost_tracks)
-        return held._replace(outcome=self._of_counted(held.outcome))
-
-    def loses_too_many(self, lost: Flags) -> bool:
-        """Return True for a design that is not given; `lost`: shape (n_draws,)."""
+    def look_at(self, lost: Flags) -> None:
+        """Find out which models that a design lost are possible, shape (n_draws,)."""
         for number in np.flatnonzero(lost).tolist():
             if number not in self.possible:
                 draw = self.draws[number]
                 self.possible[number] = is_possible(draw, self.trials)
+
+    def loses_too_many(self, lost: Flags) -> bool:
+        """Return True for a design that is not given; `lost`: shape (n_draws,)."""
+        self.look_at(lost)
         return loses_too_many(lost, self.counted)
 
-    def _held(
-        self,
-        first: Held,
-        run: Callable[[Controller], Any],
-        lost: Callable[[Any], Flags],
-    ) -> Held:
-        """The first design that holds enough models, or the first of all.
-
-        `run`: puts a design on the models; `lost`: which of them it lost.
-        """
-        if not self.loses_too_many(lost(first.outcome)):
-            return first
-        for share, other in self._variants(first.controller):
-            outcome = run(other)
-            if not self.loses_too_many(lost(outcome)):
-                return Held(other, outcome, share)
-        return first
-
-    def _variants(self, controller: Controller) -> Iterator[tuple[float, Controller]]:
-        """Designs of other bandwidths that are stable on the identified model."""
-        task = track_task(self.model) if controller.has_autopilot else None
-        for share in SHARES:
-            try:
-                other = with_bandwidth(controller, self.model, share, task)
-            except InputError:
-                continue
-            if other is not None:
-                yield share, other
-
-    def _of_counted(self, track: Track) -> Track:
+    def of_counted(self, track: Track) -> Track:
         """Track of the identified model and of the models that count."""
         counted = np.concatenate([[True], self.counted])
         return replace(

@@ -1,11 +1,10 @@
 """The figures of the report."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from agents.verification.monte_carlo import ManoeuvreUncertainty
 from agents.verification.tracks import Track
 from identification.report.figures import RUDDER
 from shipgym.arrays import Floats
@@ -24,7 +23,6 @@ from shipgym.plots import (
     translucent,
 )
 from shipgym.plots.style import Figure
-from shipgym.trials.trial import Trial
 
 PILOT_COLOURS = ("#0f8a7e", "#a1478f", "#d9822b", "#6b7a1e", "#3b5b92", "#8c564b")
 CRITERIA = {
@@ -124,47 +122,6 @@ def _marks_of(criterion: Criterion, row: int) -> list[Any]:
             mark = line([share, share], heights, name, colour, 2.2)
             marks.append(mark)
     return marks
-
-
-def manoeuvres_figure(found: ManoeuvreUncertainty, length: float) -> Figure:
-    """20/20 zigzag and turning circle of the identified model, over the draws'."""
-    headings = _zigzag_lines(found.zigzag, found.zigzag_headings)
-    left = Panel(headings, "time, s", "heading change and rudder, deg", "20/20 zigzag")
-
-    tracks = _circle_lines(found.circle, found.circle_paths, length)
-    north = axis("north, ship lengths", scaleanchor="x2", scaleratio=1)
-    right = Panel(tracks, "east, ship lengths", north, "Turning circle to starboard")
-    return _side_by_side(left, right)
-
-
-def _zigzag_lines(run: Trial, headings: Floats) -> list[Any]:
-    """Heading and rudder of the model over the band of the draws' headings."""
-    lines = []
-    if len(headings):
-        headings_deg = np.degrees(headings)
-        lines.append(band(run.t, headings_deg, "95 % of draws", MODEL))
-    rudder = np.degrees(run["delta"])
-    heading = np.degrees(run["psi"])
-    lines.append(line(run.t, rudder, "rudder", RUDDER, 1.2))
-    lines.append(line(run.t, heading, "identified model", MODEL, 2.0))
-    return lines
-
-
-def _circle_lines(run: Trial, paths: Sequence[Floats], length: float) -> list[Any]:
-    """Circle of the model over those of the draws, in ship lengths."""
-    lines = []
-    if paths:
-        gap = np.full((1, 2), np.nan)
-        parts = []
-        for path in paths:
-            parts += [path / length, gap]
-        north, east = np.concatenate(parts).T
-        pale = translucent(MODEL, 0.22)
-        lines.append(line(east, north, "single draws", pale, 1.0))
-    north = run["x"] / length
-    east = run["y"] / length
-    circle = line(east, north, "identified model", MODEL, 2.0)
-    return [*lines, circle]
 
 
 def _side_by_side(left: Panel, right: Panel) -> Figure:

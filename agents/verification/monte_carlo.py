@@ -15,10 +15,10 @@ from agents.controllers.controller_file import read_controller
 from agents.jobs import HERE, JobEngine, run_jobs
 from agents.rollouts.course_keeping import Episodes, sail
 from agents.verification.tracks import judged_task
-from shipgym.arrays import Flags, Floats
+from shipgym.arrays import Flags
 from shipgym.checks import check_whole
-from shipgym.errors import InputError, UnstableModelError
-from shipgym.manoeuvres import Criterion, turning_circle, zigzag
+from shipgym.errors import InputError
+from shipgym.manoeuvres import Criterion
 from shipgym.manoeuvres.imo import imo_criteria
 from shipgym.manoeuvres.imo_rules import imo_manoeuvres
 from shipgym.manoeuvres.intervals import (
@@ -27,10 +27,8 @@ from shipgym.manoeuvres.intervals import (
     is_size,
     own_indices,
 )
-from shipgym.manoeuvres.turning import full_rudder_deg
 from shipgym.models import ShipModel
 from shipgym.models.linear import is_course_stable
-from shipgym.trials.trial import Trial
 
 DRAWS_A_JOB = 25
 
@@ -44,12 +42,6 @@ class ManoeuvreUncertainty:
     criteria: dict[str, Criterion]
     #: draws that run away in one of the manoeuvres, shape (n_draws,)
     unstable: Flags
-    zigzag: Trial  # 20/20 zigzag of the identified model
-    #: heading change of each stable draw in it, rad, shape (n_stable, n_samples)
-    zigzag_headings: Floats
-    circle: Trial  # turning circle of the identified model
-    #: north and east of some stable draws, m, shape (n_samples, 2)
-    circle_paths: tuple[Floats, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +53,13 @@ class MonteCarlo:
     manoeuvres: ManoeuvreUncertainty
     #: draws that do not keep a straight course with the rudder fixed, shape (n_draws,)
     course_unstable: Flags
+    controllers: tuple[Controller, ...]
     episodes: tuple[Episodes, ...]  # of each controller, one episode on each draw
+
+    def episodes_of(self, controller: Controller) -> Episodes:
+        """Episodes of one of the controllers."""
+        places = [one is controller for one in self.controllers]
+        return self.episodes[places.index(True)]
 
     @property
     def stable_draws(self) -> list[ShipModel]:
@@ -92,7 +90,6 @@ def monte_carlo(
     check_whole(seed, "seed", at_least=0)
     for controller in controllers:
         controller.check_fits_model(model)
-    runs = zigzag_and_circle(model)
     drawn = model.sample(draws, seed)
 
     def on_progress(done: int, _: int) -> None:
@@ -105,8 +102,9 @@ def monte_carlo(
     by_controller = whole["episodes"].values()
     return MonteCarlo(
         draws=tuple(drawn),
-        manoeuvres=uncertainty_of(model, runs, whole["sailed"]),
+        manoeuvres=uncertainty_of(model, whole["sailed"]),
         course_unstable=whole["course_unstable"],
+        controllers=tuple(controllers),
         episodes=tuple(Episodes(**columns) for columns in by_controller),
     )
 
@@ -177,26 +175,11 @@ def keeps_course(model: ShipModel) -> bool:
         return False
 
 
-def zigzag_and_circle(model: ShipModel) -> tuple[Trial, Trial]:
-    """20/20 zigzag and turning circle of a model, as the report draws them.
-
-    Raises UnstableModelError if it runs away.
-    """
-    dt = model.travel_time / 10.0
-    rudder = full_rudder_deg(model)
-    zigzag_run = zigzag(
-        model, 20.0, 20.0, duration=250.0 * dt, dt=dt, must_reverse=False
-    )
-    return zigzag_run, turning_circle(model, rudder, 300.0 * dt, dt)
-
-
 def sail_draws(model: ShipModel, draws: Sequence[ShipModel]) -> dict[str, Any]:
     """Put models drawn from one through the standard manoeuvres.
 
     `values`: indices by manoeuvre and name, NaN where there is none, and `ran_away` by
-    manoeuvre, each of shape (n_draws,); `lost`: whether a draw runs away in the zigzag
-    or the circle, shape (n_draws,); of the others `headings` in the zigzag, rad, shape
-    (n_samples,), and `paths` in the circle, m, shape (n_samples, 2).
+    manoeuvre, each of shape (n_draws,).
     """
     needed = imo_manoeuvres(model)
     sailed = intervals_of(
@@ -210,34 +193,13 @@ def sail_draws(model: ShipModel, draws: Sequence[ShipModel]) -> dict[str, Any]:
         values[name] = {index: one.values for index, one in indices.items()}
         first = next(iter(indices.values()))
         ran_away[name] = first.ran_away
-
-    headings: list[Floats] = []
-    paths: list[Floats] = []
-    lost = np.zeros(len(draws), dtype=np.bool_)
-    for i, draw in enumerate(draws):
-        try:
-            zigzag_run, circle = zigzag_and_circle(draw)
-        except UnstableModelError:
-            lost[i] = True
-            continue
-        headings.append(zigzag_run["psi"])
-        paths.append(np.column_stack([circle["x"], circle["y"]]))
-    return {
-        "values": values,
-        "ran_away": ran_away,
-        "lost": lost,
-        "headings": headings,
-        "paths": paths,
-    }
+    return {"values": values, "ran_away": ran_away}
 
 
-def uncertainty_of(
-    model: ShipModel, runs: tuple[Trial, Trial], sailed: dict[str, Any]
-) -> ManoeuvreUncertainty:
+def uncertainty_of(model: ShipModel, sailed: dict[str, Any]) -> ManoeuvreUncertainty:
     """Intervals and criteria from the runs of a model and of its draws.
 
-    `runs`: of `zigzag_and_circle`; `sailed`: of `sail_draws`. The runs of draws that
-    run away in one of the manoeuvres are left out.
+    `sailed`: of `sail_draws`. Raises UnstableModelError if the model itself runs away.
     """
     intervals: dict[str, dict[str, IndexInterval]] = {}
     for name, indices in own_indices(model, imo_manoeuvres(model)).items():
@@ -251,20 +213,9 @@ def uncertainty_of(
             )
 
     criteria = {}
-    lost = sailed["lost"]
-    unstable = lost.copy()
+    unstable = np.any(list(sailed["ran_away"].values()), axis=0)
     for name, criterion in imo_criteria(model, intervals).items():
         if criterion.drawn is not None:
             criteria[name] = criterion
             unstable |= criterion.drawn.ran_away
-    stable = ~unstable[~lost]  # of those that were kept
-    paths_kept = 40  # turning circles of draws that a report draws
-    zigzag_run, circle = runs
-    return ManoeuvreUncertainty(
-        criteria=criteria,
-        unstable=unstable,
-        zigzag=zigzag_run,
-        zigzag_headings=np.array(sailed["headings"])[stable],
-        circle=circle,
-        circle_paths=tuple(np.array(sailed["paths"])[stable][:paths_kept]),
-    )
+    return ManoeuvreUncertainty(criteria, unstable)

@@ -18,14 +18,6 @@ from shipgym.files import write_text
 from shipgym.manoeuvres import Criterion
 from shipgym.pages import NONE, fixed, number, render
 
-#: What a controller feeds back: name, and unit of the gain on it.
-SIGNALS = {
-    "heading_error": ("heading error", "rad/rad"),
-    "yaw_rate": ("yaw rate", "s"),
-    "heading_error_integral": ("integral of heading error", "1/s"),
-    "sway": ("sway speed", "rad s/m"),
-    "rudder": ("rudder", "rad/rad"),
-}
 #: Name and unit of each margin.
 MARGINS = {
     "gain_margin": ("gain margin, upwards", "factor"),
@@ -171,7 +163,7 @@ def _interval(criterion: Criterion) -> str:
 
 
 def designs_of(found: Verification) -> dict[str, Any]:
-    """Names, gains and margins of the designs, for the tables of the page."""
+    """Names and margins of the designs, for the tables of the page."""
     designs: dict[str, Controller] = {}
     learned = []
     for pilot in found.by_name:
@@ -179,7 +171,6 @@ def designs_of(found: Verification) -> dict[str, Any]:
             learned.append(pilot.name)
         else:
             designs[pilot.name] = pilot.design
-    linear = {name: design for name, design in designs.items() if design.feedback}
     margins = []
     for field, words in MARGINS.items():
         values = [getattr(design.margins, field) for design in designs.values()]
@@ -188,26 +179,8 @@ def designs_of(found: Verification) -> dict[str, Any]:
     return {
         "designs": list(designs),
         "learned": learned,
-        "linear": linear,
-        "gains": _gain_rows(linear),
         "margins": margins,
     }
-
-
-def _gain_rows(designs: Mapping[str, Controller]) -> list[tuple[str, str, list[Any]]]:
-    """Signal, unit, and of each design name and value of the gain, or None."""
-    by_signal = []
-    for design in designs.values():
-        own = {}
-        for gain, (signal, _) in design.feedback.items():
-            own[signal] = gain, design.gains[gain]
-        by_signal.append(own)
-    rows = []
-    for signal, words in SIGNALS.items():
-        gains = [own.get(signal) for own in by_signal]
-        if any(gains):
-            rows.append((*words, gains))
-    return rows
 
 
 def result_figures(
@@ -223,7 +196,6 @@ def result_figures(
     shown = {
         **trial_figures(fit),
         "criteria": figures.criteria_figure(manoeuvres.criteria),
-        "manoeuvres": figures.manoeuvres_figure(manoeuvres, length),
         "steps": figures.steps_figure(t, responses, STEP_DEG),
     }
     if found.tracks:

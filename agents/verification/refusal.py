@@ -218,7 +218,7 @@ def lost_control(
         )
     if found.left_out:
         why += f"; {found.left_out} more run away whatever steers them"
-    return f"{why}; nor does it hold them with another bandwidth"
+    return why
 
 
 def _off_course(unstable: Flags) -> str:
@@ -243,5 +243,5 @@ def lost_track(track: Track, most_lost: float = MOST_LOST) -> str | None:
         return None
     return (
         f"it does not reach the end of the track with {lost} of {len(arrived)} models"
-        " drawn; nor does it with another bandwidth"
+        " drawn"
     )

@@ -60,15 +60,13 @@ class Verification:
     #: draws that do not hold a straight course with the rudder held, shape (n_draws,)
     course_unstable: Flags
     nomoto: Nomoto  # of the identified model
-    pilots: tuple[Pilot, ...]  # ranked, the lowest mean cost first
+    pilots: tuple[Pilot, ...]  # ranked: fewest lost, then the lowest median cost
     #: autopilots that could not be designed on the model, and why
     refused: dict[str, str]
     tracks: tuple[Track, ...] = ()  # of autopilots that keep to a track
     #: draws that count against a design: the others run away whatever steers them,
     #: shape (n_draws,); None for all
     counted: Flags | None = None
-    #: how designs were changed to hold the models drawn, by their kind
-    retuned: dict[str, str] = field(default_factory=dict)
     #: what a search of settings found, by their kind
     tuned: dict[str, str] = field(default_factory=dict)
 
@@ -143,7 +141,6 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
         "controllers": {pilot.key: pilot_metrics(pilot) for pilot in found.pilots},
         "ranking": [pilot.key for pilot in found.pilots],
         "refused": found.refused,
-        "retuned": found.retuned,
         "tuned": found.tuned,
         "tracks": {track.key: track_metrics(track) for track in found.tracks},
     }
@@ -186,6 +183,7 @@ def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
         "gains": gains,
         "margins": margins,
         "cost_mean": float(np.mean(episodes.cost)),
+        "cost_median": float(np.median(episodes.cost)),
         "cost_quantile_95": upper_95(episodes.cost),
         "heading_rmse_deg_mean": float(np.mean(rmse_deg)),
         "heading_rmse_deg_quantile_95": upper_95(rmse_deg),

@@ -10,10 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from agents.controllers.controller import Controller
+from agents.controllers.wheel_over import own_lead
 from agents.rollouts.metrics import root_mean_square, succeeded
 from agents.rollouts.rollout import Rollout, rollout
 from shipgym.arrays import Flags, Floats
 from shipgym.envs.engine import Engine
+from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.sea.conditions import Current, Weather
 from shipgym.tasks.task import Task, course_keeping_task
@@ -40,12 +42,21 @@ class Track:
 
 
 def track_task(model: ShipModel) -> Task:
-    """The track for a ship, in a current of a tenth of her speed."""
+    """The track for a ship, in a current of a tenth of her speed.
+
+    It is as much wider as she is slow to turn: by how far ahead she has to see an arc
+    (`own_lead`), over what is usual.
+    """
+    usual_lead = 2.5  # ship lengths
+    try:
+        wider = max(1.0, own_lead(model, None) / usual_lead)
+    except InputError:  # no LQ holds her; who leads her says so
+        wider = 1.0
     # changes of course, to starboard positive
     turns_deg = (30.0, -60.0, 90.0, -90.0, 45.0)
     courses = np.radians(np.cumsum([0.0, *turns_deg]))
     directions = np.column_stack([np.cos(courses), np.sin(courses)])
-    leg_lengths = 12.0  # of each leg
+    leg_lengths = 12.0 * wider  # of each leg
     legs = leg_lengths * model.particulars["length"] * directions
     ends = np.cumsum(legs, axis=0)
     waypoints = np.vstack([np.zeros(2), ends])
@@ -55,7 +66,8 @@ def track_task(model: ShipModel) -> Task:
         "PathFollowing",
         waypoints=waypoints,
         sea=Weather(current=current),
-        episode_steps=3000,  # about twice what it takes
+        turn_radius=4.0 * wider,
+        episode_steps=int(3000 * wider),  # about twice what it takes
         max_envelope_distance=ANYWHERE,
     )
 

@@ -14,6 +14,7 @@ from agents.training.controller_search import (
     tune_controller,
     unseen_episodes,
 )
+from agents.verification.closed_loop import Held
 from agents.verification.tracks import track_task
 from identification.progress import Progress
 from shipgym import Current, ShipModel, Weather
@@ -29,15 +30,27 @@ class Tuned(NamedTuple):
     on_draws: bool  # whether they were searched on models drawn
 
     @property
-    def in_words(self) -> str:
-        """Sentence for the report."""
-        found = self.found
-        where = "models drawn" if self.on_draws else "episodes of the identified model"
-        return (
-            f"{found.evaluations} candidates in {found.seconds:.0f} s of processor;"
-            f" cost {found.start_cost:.3g} as designed, {found.cost:.3g} tuned, on"
-            f" {where} that the search has not seen"
-        )
+    def leads(self) -> bool:
+        """True for a path autopilot."""
+        return self.controller.has_autopilot
+
+
+def no_worse(designed: Held, tuned: Held, search: Tuned) -> tuple[Held, str]:
+    """What a search found if it is no worse over the models drawn, else the design.
+
+    Returns it with a sentence for the report.
+    """
+    before, after = designed.judged, tuned.judged
+    is_no_worse = all(new <= old for new, old in zip(after, before, strict=True))
+    unit = " m off track" if search.leads else ""
+    taken = "taken" if is_no_worse else "not taken, the design is kept"
+    found = search.found
+    words = (
+        f"{found.evaluations} candidates in {found.seconds:.0f} s of processor,"
+        f" {taken}: over the models drawn mean {after[1]:.3g}{unit} and"
+        f" {after[0]} lost, as designed {before[1]:.3g}{unit} and {before[0]} lost"
+    )
+    return tuned if is_no_worse else designed, words
 
 
 def tuned_design(kind: str, model: ShipModel, seconds: float, tell: Progress) -> Tuned:

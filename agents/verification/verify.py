@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,16 +13,18 @@ import numpy as np
 from agents.controllers.controller import Controller
 from agents.controllers.registry import controller_class
 from agents.jobs import HERE, JobEngine
-from agents.rollouts.course_keeping import Episodes, step_response
+from agents.rollouts.course_keeping import step_response
 from agents.training.controller_space import searched_kinds
-from agents.verification.closed_loop import ClosedLoop, in_words
-from agents.verification.monte_carlo import monte_carlo
+from agents.verification.closed_loop import ClosedLoop, Held, lost_tracks
+from agents.verification.monte_carlo import MonteCarlo, monte_carlo
 from agents.verification.result import STEP_DEG, Pilot, Verification
 from agents.verification.tracks import track_task
-from agents.verification.tuned import tuned_design
+from agents.verification.tuned import Tuned, no_worse, tuned_design
 from identification.progress import Progress
+from shipgym.arrays import Flags
 from shipgym.checks import quoted
 from shipgym.errors import InputError
+from shipgym.manoeuvres.quantiles import upper_95
 from shipgym.models import ShipModel
 from shipgym.models.linear import nomoto
 from shipgym.trials.trial import Trial
@@ -45,7 +48,7 @@ def verify(
 ) -> Verification:
     """Design autopilots on a model and run them over models drawn from its covariance.
 
-    A design that loses too many of them is retuned on them. `model`: with a covariance;
+    `model`: with a covariance;
     `draws`, `seed`, `where`, `designs`: see `build_autopilot`; `tell`: called with the
     progress; `guests`: further autopilots; `trials`: that the ship was put through: a
     model drawn that runs away in one of them does not count; `tune_seconds`: of
@@ -54,8 +57,9 @@ def verify(
     """
     tell("models drawn", 0, draws)
     designed = design_autopilots(model, designs, tune_seconds, tell)
+    tuned = [one.controller for one in designed.tuned.values() if not one.leads]
     found = monte_carlo(
-        designed.controllers,
+        [*designed.controllers, *tuned],
         model,
         draws,
         seed,
@@ -68,30 +72,65 @@ def verify(
         seeds=seed + np.arange(draws),
         trials=trials,
     )
-    courses = loop.keep_courses(designed.controllers, found.episodes)
-    tracks = [loop.keep_track(guide) for guide in designed.guides]
-    steered = [
-        *[(held.controller, held.outcome) for held in courses],
-        *[(guest, loop.sail(guest)) for guest in guests],
+    return judged(designed, found, loop, guests, tell)
+
+
+def judged(
+    designed: Designed,
+    found: MonteCarlo,
+    loop: ClosedLoop,
+    guests: Sequence[Agent],
+    tell: Progress,
+) -> Verification:
+    """Findings on designs, and further autopilots, that sailed the models drawn."""
+    told: dict[str, str] = {}
+    courses = [
+        chosen(one, found.episodes_of, designed.tuned, told)
+        for one in designed.controllers
     ]
-    pilots = run_pilots(steered, [model, *found.stable_draws], tell)
+    guides = [chosen(one, loop.led, designed.tuned, told) for one in designed.guides]
+    for held in courses:
+        loop.look_at(held.outcome.terminated)
+    for held in guides:
+        loop.look_at(lost_tracks(held.outcome))
+    steered = [*courses, *[Held(guest, loop.sail(guest)) for guest in guests]]
+    pilots = run_pilots(steered, [loop.model, *found.stable_draws], tell)
     return Verification(
-        draws=draws,
-        seed=seed,
+        draws=len(loop.draws),
+        seed=int(loop.seeds[0]),
         manoeuvres=found.manoeuvres,
         course_unstable=found.course_unstable,
-        nomoto=nomoto(model),
-        pilots=tuple(sorted(pilots, key=_mean_cost)),
+        nomoto=nomoto(loop.model),
+        pilots=tuple(sorted(pilots, key=partial(_rank, counted=loop.counted))),
         refused=designed.refused,
-        tracks=tuple(held.outcome for held in tracks),
+        tracks=tuple(loop.of_counted(held.outcome) for held in guides),
         counted=loop.counted,
-        retuned=in_words([*courses, *tracks]),
-        tuned=designed.tuned,
+        tuned=told,
     )
 
 
+def chosen(
+    controller: Controller,
+    outcome_of: Callable[[Controller], Any],
+    tuned: Mapping[str, Tuned],
+    told: dict[str, str],
+) -> Held:
+    """A design with its outcome on the models drawn, or what a search found.
+
+    `outcome_of`: episodes or track of a controller; `tuned`: what searches found, by
+    kind; `told`: receives a sentence on each search.
+    """
+    designed = Held(controller, outcome_of(controller))
+    search = tuned.get(controller.kind)
+    if search is None:
+        return designed
+    other = Held(search.controller, outcome_of(search.controller))
+    held, told[controller.kind] = no_worse(designed, other, search)
+    return held
+
+
 def run_pilots(
-    steered: Sequence[tuple[Agent, Episodes]],
+    steered: Sequence[Held],
     ships: Sequence[ShipModel],
     tell: Progress,
 ) -> list[Pilot]:
@@ -107,8 +146,14 @@ def run_pilots(
     return pilots
 
 
-def _mean_cost(pilot: Pilot) -> float:
-    return float(np.mean(pilot.episodes.cost))
+def _rank(pilot: Pilot, counted: Flags) -> tuple[float, ...]:
+    """Models lost, then the median and the 95 % quantile of the cost.
+
+    A mean would be decided by one model that is lost.
+    """
+    episodes = pilot.episodes
+    lost = float(np.sum(episodes.terminated[counted]))
+    return lost, float(np.median(episodes.cost)), upper_95(episodes.cost)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +165,7 @@ class Designed:
     #: why others could not be designed, by their kind
     refused: dict[str, str] = field(default_factory=dict)
     #: what a search of settings found, by their kind
-    tuned: dict[str, str] = field(default_factory=dict)
+    tuned: dict[str, Tuned] = field(default_factory=dict)
 
 
 def design_autopilots(
@@ -137,14 +182,10 @@ def design_autopilots(
     for kind in dict.fromkeys(designs):
         made: Any = controller_class(kind)
         try:
+            task = {"task": track_task(model)} if made.has_autopilot else {}
+            controller = made.from_model(model, **task)
             if tune_seconds > 0.0 and kind in searched_kinds():
-                tuned = tuned_design(kind, model, tune_seconds, tell)
-                found.tuned[kind] = tuned.in_words
-                controller = tuned.controller
-            elif made.has_autopilot:
-                controller = made.from_model(model, task=track_task(model))
-            else:
-                controller = made.from_model(model)
+                found.tuned[kind] = tuned_design(kind, model, tune_seconds, tell)
             group = found.guides if made.has_autopilot else found.controllers
             group.append(controller)
         except InputError as error:  # this design does not suit the ship; another may

@@ -10,7 +10,9 @@ from agents import LQ, PID, sail, step_response
 from agents.controllers.linear_loop import sample_ship
 from agents.controllers.lq import SteeringCost, lq_gain
 from shipgym.errors import InputError
+from shipgym.models import load_model
 from shipgym.models.linear import nomoto
+from shipgym.tasks.task import course_keeping_task
 from tests.agents.mariners import (
     HARD_TO_STEER,
     LENGTH_TIME,
@@ -81,6 +83,56 @@ def test_ships_hard_to_steer_are_kept_on_course(kind, name):
     assert episodes.cost.mean() < 70.0
     step = step_response(controller, model, duration=60.0 * LENGTH_TIME)
     assert np.degrees(step.heading[0, -200:]) == pytest.approx(20.0, abs=0.1)
+
+
+def overshoot(controller, ship, share):
+    """Overshoot of a change of 20 degrees, deg, at a share of her service speed."""
+    state, memory = np.array(ship.service_state), None
+    names, dt = ship.state_names, controller.design["dt"]
+    state[names.index("u")] *= share
+    largest = 0.0
+    for _ in range(int(12.0 * ship.travel_time / share / dt)):
+        known = dict(zip(names, state, strict=True))
+        error = np.radians(20.0) - known["psi"]
+        angles = [np.sin(error), np.cos(error)]
+        seen = np.array([*angles, known["r"], known["v"], known["u"], 0.0, 0.0, 0.0])
+        action, memory = controller.predict(
+            seen / controller.observation_scales, memory
+        )
+        order = [action[0] * controller.rudder_limit, share * ship.service_shaft_speed]
+        state = ship.simulate(np.array([order] * 2), 0.5 * dt, state)
+        state = np.array([state[name][-1] for name in names])
+        largest = max(largest, np.degrees(state[names.index("psi")]))
+    return largest - 20.0
+
+
+@pytest.mark.parametrize("kind", [PID, LQ])
+def test_a_slow_ship_turns_as_she_does_at_service_speed(kind):
+    """One set of gains overshoots by 3 degrees at half of it."""
+    ship = load_model("kvlcc2")
+    assert overshoot(kind.from_model(ship), ship, 0.5) < 1.0
+    assert overshoot(kind.from_model(ship, schedule=0.0), ship, 0.5) > 2.0
+
+
+@pytest.mark.parametrize(("kind", "share"), [(PID, 0.5), (LQ, 0.75)])
+def test_waves_are_kept_from_the_rudder_where_a_sea_is_given(kind, share):
+    """The design for a rough sea, at the same heading error and with margins."""
+    task = course_keeping_task(sea="rough", noise=1.0)
+    unaware = kind.from_model(MARINER)
+    aware = kind.from_model(MARINER, wave_period=task.weather.waves.peak_period)
+    assert aware.margins.is_enough
+    plain, calm = (sail(one, MARINER, task, np.arange(16)) for one in (unaware, aware))
+    travel = calm.rudder_travel_deg_min.mean()
+    assert travel < share * plain.rudder_travel_deg_min.mean()
+    error = calm.heading_rmse_deg.mean()
+    assert error < 1.05 * plain.heading_rmse_deg.mean()
+    assert calm.cost.mean() < plain.cost.mean()
+
+
+@pytest.mark.parametrize("period", [0.5, 90.0])
+def test_a_period_that_no_sea_is_met_with_is_refused(period):
+    with pytest.raises(InputError, match=r"^wave_period: .*expected a number [<>]="):
+        LQ.from_model(MARINER, wave_period=period)
 
 
 @pytest.mark.parametrize("kind", [PID, LQ])

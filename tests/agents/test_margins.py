@@ -1,72 +1,145 @@
-"""Margins and bandwidth of linear loops against poles and python-control."""
+"""Margins are the least over every break of the loop, by poles and by simulation."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from agents import LQ, LQG, PID
+from agents import LQ, LQG, PID, step_response
 from agents.controllers.linear_loop import SIGNALS, sample_ship
-from agents.controllers.margins import largest_pole
-from shipgym.errors import InputError
-from shipgym.tasks import control_interval
-from tests.agents.mariners import LAGGING, MARINER, changed
+from agents.controllers.margins import crossings, frequencies_of, largest_pole
+from shipgym.models import load_model
+from shipgym.ships.steering import SteeringGear
+from tests.agents.mariners import LAGGING, LENGTH_TIME, MARINER, UNSTABLE
 
-RUDDER = np.array(SIGNALS) == "rudder"
+SHIPS = {
+    "mariner": MARINER,
+    "lagging": LAGGING,
+    "unstable": UNSTABLE,
+    **{name: load_model(name) for name in ("kvlcc2", "tanker", "container")},
+    **{name: load_model(name) for name in ("mariner-tls-svm", "kvlcc2-rm-svm")},
+}
+DESIGNS = (PID, LQ, LQG)
+HEADING = ("heading_error", "heading_error_integral")
 
 
-def pole_with(controller, ship, factor):
-    """Largest pole where the rudder's effect on the ship is multiplied."""
-    gains = np.array(controller.parameters.gains)
-    changed = gains * np.where(RUDDER, 1.0, factor)
-    return largest_pole(ship.A + ship.B @ changed[None])
+def signals_at(place):
+    return np.isin(SIGNALS, HEADING if place == "heading_error" else place)
 
 
-@pytest.mark.parametrize("kind", [PID, LQ])
-def test_margins_are_where_the_sampled_loop_becomes_unstable(kind):
-    controller = kind.from_model(LAGGING)
-    ship = sample_ship(LAGGING, control_interval(LAGGING))
+def pole(controller, ship, place, factor=1.0, delay=0):
+    """Largest pole with a gain, and a delay in intervals, at one place of the loop."""
+    loop = controller.loop()
+    columns = np.where(signals_at(place), factor, 1.0)
+    order = factor if place == "order" else 1.0
+    changed = replace(
+        loop, B=loop.B * columns, C=order * loop.C, D=order * loop.D * columns
+    )
+    if place != "order" or not delay:
+        return largest_pole(changed.closed_loop(ship))
+    n = len(loop.A)
+    into_line = np.zeros((delay, 5 + n))
+    into_line[0] = np.hstack([loop.D[0], loop.C[0]])
+    into_ship = np.zeros((5 + n, delay))
+    into_ship[:5, [-1]] = ship.B
+    plant = np.block([[ship.A, np.zeros((5, n))], [loop.B, loop.A]])
+    line = np.eye(delay, k=-1)
+    return largest_pole(np.block([[plant, into_ship], [into_line, line]]))
+
+
+def breaks(controller, ship):
+    omega = frequencies_of(ship)
+    broken = controller.loop().responses(ship, omega).broken
+    return {place: crossings(omega, one) for place, one in broken.items()}
+
+
+@pytest.mark.parametrize("kind", DESIGNS)
+@pytest.mark.parametrize("name", SHIPS)
+def test_at_each_break_the_loop_is_stable_up_to_its_margin(name, kind):
+    controller = kind.from_model(SHIPS[name])
+    ship = sample_ship(SHIPS[name], controller.design["dt"])
+    found = breaks(controller, ship)
+    assert {"order", "yaw_rate", "heading_error"} <= set(found)
+    assert "rudder" not in found
+    raised = {}
+    for place, one in found.items():
+        raised[place] = min(one.gains[one.gains > 1.0], default=np.inf)
+        if np.isfinite(raised[place]):
+            assert pole(controller, ship, place, 0.99 * raised[place]) < 1.0
+            assert pole(controller, ship, place, 1.01 * raised[place]) > 1.0
     margins = controller.margins
-    assert pole_with(controller, ship, margins.gain_margin) == pytest.approx(
-        1.0, abs=1e-5
+    assert margins.gain_margin == pytest.approx(min(raised.values()))
+    intervals = min(found["order"].delays_s) / ship.dt
+    assert pole(controller, ship, "order", delay=int(intervals)) < 1.0
+    assert pole(controller, ship, "order", delay=int(intervals) + 1) > 1.0
+    if margins.lowest_gain:
+        assert pole(controller, ship, "order", 1.02 * margins.lowest_gain) < 1.0
+        assert pole(controller, ship, "order", 0.98 * margins.lowest_gain) > 1.0
+
+
+@pytest.mark.parametrize("kind", DESIGNS)
+@pytest.mark.parametrize("name", SHIPS)
+def test_designs_have_six_decibels_and_thirty_degrees_everywhere(name, kind):
+    margins = kind.from_model(SHIPS[name]).margins
+    assert margins.gain_margin >= 2.0
+    assert margins.phase_margin_deg >= 30.0
+
+
+class Broken:
+    """A controller with a gain at one place of each ship's loop."""
+
+    def __init__(self, controller, gains):
+        self.controller = controller
+        self.check_fits = controller.check_fits
+        names = list(controller.observation_names)
+        self.seen = np.ones((len(gains), len(names)))
+        self.order = np.ones((len(gains), 1))
+        for lane, (place, gain) in enumerate(gains):
+            if place == "order":
+                self.order[lane] = gain
+            elif place == "heading_error":
+                places = ("heading_error_sin", "heading_error_integral")
+                self.seen[lane, [names.index(one) for one in places]] = gain
+            else:
+                self.seen[lane, names.index(place)] = gain
+
+    def predict(self, seen, state=None, starts=None, deterministic=True):
+        neutral = self.controller.neutral_rudder / self.controller.rudder_limit
+        shown = seen * self.seen
+        shown[:, self.controller.observation_names.index("last_command")] = neutral
+        action, state = self.controller.predict(shown, state, starts)
+        return np.clip(neutral + (action - neutral) * self.order, -1.0, 1.0), state
+
+
+@pytest.mark.parametrize("kind", DESIGNS)
+@pytest.mark.parametrize("name", ["mariner", "lagging"])
+def test_ships_settle_below_a_margin_and_swing_above_it(name, kind):
+    """At nine tenths and eleven tenths of each margin, gear and its limits included."""
+    model = SHIPS[name]
+    controller = kind.from_model(model)
+    gains = []
+    for place, one in breaks(
+        controller, sample_ship(model, controller.design["dt"])
+    ).items():
+        margin = min(one.gains[one.gains > 1.0], default=np.inf)
+        if margin < 100.0:
+            gains += [(place, 0.9 * margin), (place, 1.1 * margin)]
+    step = step_response(
+        Broken(controller, gains),
+        [model] * len(gains),
+        step_deg=0.05,
+        duration=60.0 * model.travel_time,
     )
-    assert pole_with(controller, ship, margins.lowest_gain) == pytest.approx(
-        1.0, abs=1e-5
-    )
-    assert pole_with(controller, ship, 1.0) < 1.0
-    assert margins.gain_margin > 2.0 > 0.5 > margins.lowest_gain > 0.0
-    assert margins.phase_margin_deg > 35.0
+    ends = np.degrees(step.rudder[:, -len(step.t) // 5 :]).std(axis=1)
+    for place, settled, swinging in zip(gains[::2], ends[::2], ends[1::2], strict=True):
+        assert settled < 0.1, place
+        assert swinging > 1.0, place
 
 
-def test_a_delay_beyond_the_margin_makes_the_loop_unstable():
-    pid = PID.from_model(MARINER)
-    ship = sample_ship(MARINER, control_interval(MARINER))
-    gains = np.array(pid.parameters.gains)
-
-    def pole_with_delay(intervals):
-        """The command passes a line of buffers."""
-        into_ship = np.zeros((5, intervals))
-        into_ship[:, [-1]] = ship.B
-        into_line = np.zeros((intervals, 5))
-        into_line[0] = gains
-        line = np.eye(intervals, k=-1)
-        return largest_pole(np.block([[ship.A, into_ship], [into_line, line]]))
-
-    delay = pid.margins.delay_margin_s / ship.dt
-    assert pole_with_delay(int(np.floor(delay))) < 1.0
-    assert pole_with_delay(int(np.ceil(delay))) > 1.0
-
-
-RUDDER_COEFFICIENTS = ("Y_d", "Y_ud", "Y_uud", "N_d", "N_ud", "N_uud")
-
-
-@pytest.mark.parametrize("kind", [PID, LQ, LQG])
-def test_the_gain_margin_is_the_rudder_effect_at_which_the_loop_becomes_unstable(kind):
-    controller = kind.from_model(MARINER)
-    margin = controller.margins.gain_margin
-
-    def ship(factor):
-        return changed(**dict.fromkeys(RUDDER_COEFFICIENTS, factor))
-
-    near = controller.margins_on(ship(0.9 * margin))
-    assert near.gain_margin == pytest.approx(1.0 / 0.9, rel=0.05)
-    with pytest.raises(InputError):
-        controller.margins_on(ship(1.1 * margin))
+@pytest.mark.parametrize("kind", DESIGNS)
+def test_a_gear_far_slower_than_the_design_knows_still_settles(kind):
+    """1 deg/s and a lag of 8 s, where the design knows 5 deg/s and 1 s."""
+    slow = replace(MARINER, steering=SteeringGear(40.0, 1.0, 8.0))
+    step = step_response(kind.from_model(MARINER), slow, duration=40.0 * LENGTH_TIME)
+    end = np.degrees(step.heading[0, -len(step.t) // 4 :])
+    assert end == pytest.approx(20.0, abs=0.5)

@@ -34,9 +34,6 @@ def assert_same(one, other):
     ]
     np.testing.assert_array_equal(one.course_unstable, other.course_unstable)
     np.testing.assert_array_equal(one.manoeuvres.unstable, other.manoeuvres.unstable)
-    np.testing.assert_array_equal(
-        one.manoeuvres.zigzag_headings, other.manoeuvres.zigzag_headings
-    )
     for name, criterion in one.manoeuvres.criteria.items():
         np.testing.assert_array_equal(
             criterion.drawn.values, other.manoeuvres.criteria[name].drawn.values

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from agents import MPC, WheelOver, check_controller, load_agent
+from agents.controllers.law import Turns
+from agents.controllers.path_ahead import PathAhead
 from agents.rollouts.rollout import episode_costs
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
@@ -45,6 +47,22 @@ def test_to_port_it_does_what_it_does_to_starboard():
     one, _ = guide.predict(seen)
     other, _ = guide.predict(mirrored(seen))
     assert other == pytest.approx(-one, abs=1e-5)
+
+
+@pytest.mark.parametrize("degrees", [60.0, 90.0, 120.0])
+def test_arcs_end_after_their_angle_also_beyond_a_right_angle(degrees):
+    radius, angle = 100.0, np.radians(degrees)
+    one, other = np.ones(1), np.zeros(1)
+    path = PathAhead(Turns(50.0 * one, angle * one, other, other), radius)
+    for swept in np.linspace(0.0, angle, 20):
+        x, y = 50.0 + radius * np.sin(swept), radius * (1.0 - np.cos(swept))
+        place = path.fix(x * one, y * one)
+        assert place.course == pytest.approx([swept], abs=1e-9)
+        assert place.cross_track == pytest.approx([0.0], abs=1e-9)
+    x, y = x + 70.0 * np.cos(angle), y + 70.0 * np.sin(angle)
+    place = path.fix(x * one, y * one)
+    assert place.course == pytest.approx([angle])
+    assert place.along_track == pytest.approx([50.0 + radius * angle + 70.0])
 
 
 def test_in_a_current_its_search_is_worth_something_though_it_is_told_of_none():

@@ -36,19 +36,20 @@ def test_without_price_on_the_rudder_rate_the_optimal_poles_have_the_textbook_da
 def test_commands_are_the_gains_on_what_is_observed():
     pid, scales = PID.from_model(MARINER), observation_scales(MARINER)
     error, yaw_rate, integral = np.radians(3.0), np.radians(0.1), 1.5
-    physical = [np.sin(error), np.cos(error), yaw_rate, 0.1, 7.0, 0.1, 0.1, integral]
+    half = 0.5 * MARINER.particulars["speed"]  # where gains by time are doubled
+    physical = [np.sin(error), np.cos(error), yaw_rate, 0.1, half, 0.1, 0.1, integral]
     seen = np.array(physical) / scales
     order = (
         pid.neutral_rudder
         + pid.gains["proportional"] * error
-        + pid.gains["integral"] * integral
-        - pid.gains["derivative"] * yaw_rate
+        + 0.5 * pid.gains["integral"] * integral
+        - 2.0 * pid.gains["derivative"] * yaw_rate
     )
 
-    action, state = pid.predict(seen, state="kept")
+    action, state = pid.predict(seen)
     assert action.dtype == np.float32
     assert action == pytest.approx([order / MARINER.steering.limit], rel=1e-5)
-    assert state == "kept"
+    assert state.shape == (pid.memory_size,)
     many, _ = pid.predict(np.stack([seen, -seen]))
     assert many.shape == (2, 1)
     assert many[0] == action

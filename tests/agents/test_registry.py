@@ -9,16 +9,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from agents import (
-    LQ,
-    Controller,
-    benchmark,
-    check_controller,
-    load_agent,
-    register_controller,
-)
+from agents import LQ, benchmark, check_controller, load_agent, register_controller
 from agents.controllers import registry
-from agents.controllers.law import Nothing, linear_law
+from agents.controllers.controller import Controller
+from agents.controllers.law import HelmMemory, linear_law
 from agents.suites.suite import find_task
 from agents.training.algorithms import design_base
 from shipgym import load_model
@@ -65,6 +59,7 @@ class LastOrder(NamedTuple):
     """What `Sluggish` remembers."""
 
     order: float
+    helm: HelmMemory
 
 
 class Sluggish(LQ):
@@ -73,9 +68,9 @@ class Sluggish(LQ):
     memory_record = LastOrder
 
     def steer(self, seen, memory):
-        plain, _ = linear_law(seen, Nothing(), self.parameters)
+        plain, helm = linear_law(seen, memory.helm, self.parameters)
         order = 0.5 * (plain + memory.order)
-        return order, LastOrder(order)
+        return order, LastOrder(order, helm)
 
 
 def test_a_controller_of_ones_own_is_one_file(mine, tmp_path, monkeypatch):

@@ -1,0 +1,121 @@
+"""What every heading autopilot does to its order, and the gear that it knows.
+
+Source: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 11.2
+(low-pass and notch filters against waves), 13.2 (dead-band).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from agents.controllers.law import Biquad, Helm
+from agents.settings import Settings, Step, setting
+from shipgym import ShipModel
+from shipgym.checks import check_number
+
+#: Gains of the helm in a controller's file, with their bounds.
+HELM_BOUNDS = {
+    "rudder_update": (1e-6, 1.0),
+    "rudder_band": (0.0, np.pi),
+    "wave_period": (0.0, 1e6),
+    "wave_corner": (1e-3, 1e3),
+    "schedule": (0.0, 1.0),
+    "gear_share": (1e-6, 1.0),
+    "gear_step": (1e-9, 1e6),
+}
+SHORTEST_WAVE, LONGEST_WAVE = 1.0, 60.0  # s, with which a sea is met
+#: Corners of the wave filter that are tried, over the frequency of the waves.
+CORNERS = (0.5, 0.7, 1.0, 1.4, 2.0)
+
+
+@dataclass(frozen=True)
+class HelmSettings(Settings):
+    """Settings of every heading autopilot."""
+
+    wave_period: float | None = setting(
+        "of the waves as they are met, s, whose yawing is not answered with rudder; by"
+        " default that of the task's sea, without one no filter",
+        None,
+        at_least=SHORTEST_WAVE,
+        at_most=LONGEST_WAVE,
+        search=Step(0.3, reach=3.0),
+    )
+    schedule: float = setting(
+        "1 for gains that follow the measured speed, 0 for the same at all speeds",
+        1.0,
+        at_least=0.0,
+        at_most=1.0,
+    )
+
+    def helm(self, model: ShipModel, dt: float) -> dict[str, float]:
+        """Gains of the helm on a model; `dt`: control interval, s.
+
+        Raises InputError for a wave that the interval cannot follow.
+        """
+        if self.wave_period is not None:
+            check_number(
+                self.wave_period,
+                "wave_period",
+                above=2.0 * dt,
+                hint="two control intervals, in s",
+            )
+        gear = model.steering
+        lag = gear.time_constant
+        share = 1.0 - np.exp(-dt / lag) if lag > 0.0 else 1.0
+        return {
+            "rudder_update": 1.0,
+            "rudder_band": 0.0,
+            "wave_period": self.wave_period or 0.0,
+            "wave_corner": CORNERS[0],
+            "schedule": self.schedule,
+            "gear_share": float(share),
+            "gear_step": gear.rate * dt,
+        }
+
+
+def known(settings: Settings) -> dict[str, float]:
+    """Settings by name, without those that have no value."""
+    values = settings.to_dict()
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def helm_of(gains: Mapping[str, Any], dt: float, limit: float) -> Helm:
+    """Parameters of the helm by a controller's gains; `limit`: largest rudder, rad."""
+    return Helm(
+        wave=wave_filter(gains["wave_period"], gains["wave_corner"], dt),
+        update=gains["rudder_update"],
+        band=gains["rudder_band"],
+        gear_share=gains["gear_share"],
+        gear_step=gains["gear_step"],
+        limit=limit,
+    )
+
+
+def wave_filter(period: Any, share: Any, dt: float) -> Biquad:
+    """Low-pass with a notch at the waves; the identity for a period of 0.
+
+    H(s) = (w / n)^2 (s^2 + 2 depth n s + n^2) / (s^2 + 2 damping w s + w^2), with n the
+    frequency of the waves and w a share of it, by the bilinear transform.
+    """
+    depth, damping = 0.2, 0.6
+    is_asked = np.greater(period, 0.0)
+    notch = np.tan(np.pi * dt / np.where(is_asked, period, 4.0 * dt))
+    corner = share * notch
+    norm = 1.0 + 2.0 * damping * corner + corner * corner
+    gain = share * share / norm
+    square = notch * notch
+    numbers = (
+        gain * (1.0 + 2.0 * depth * notch + square),
+        gain * 2.0 * (square - 1.0),
+        gain * (1.0 - 2.0 * depth * notch + square),
+        2.0 * (corner * corner - 1.0) / norm,
+        (1.0 - 2.0 * damping * corner + corner * corner) / norm,
+    )
+    return Biquad(
+        *[
+            np.where(is_asked, one, none)[()]
+            for one, none in zip(numbers, Biquad(), strict=True)
+        ]
+    )
