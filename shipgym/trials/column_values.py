@@ -64,7 +64,10 @@ def without_sentinels(
         are_nines = abs(number) >= 999.0 and set(digits) == {"9"}
         others = np.abs(values[np.isfinite(values) & (values != number)])
         is_far = others.size and abs(number) > 3.0 * others.max()
-        if (number in known or are_nines) and (is_far or abs(number) > largest):
+        is_place = channel in ("x", "y")  # which may be that far
+        if number not in known and (is_place or not are_nines):
+            continue
+        if is_far or abs(number) > largest:
             is_number = numbers == number
             values = np.where(is_number, np.nan, values)
             count = np.count_nonzero(is_number)

@@ -93,6 +93,8 @@ def test_a_missing_channel_is_named_with_those_present():
         ),
         ([0.0, 1.0, 2.0], {"r": ["a", "b", "c"]}, "expected an array of numbers"),
         ([0.0, 1.0, 2.0], {"rudder": [0, 0, 0]}, "unknown channel 'rudder'"),
+        ([0.0, 1.0, 2.0], {"delta": [0, 10, 0]}, r"in degrees \(10 in sample 1\)"),
+        (T, {"psi": 20.0 * np.sin(0.2 * T), "r": 0.07 * np.cos(0.2 * T)}, "in degrees"),
         ([0.0, 1.0, 2.0], {}, "expected at least one channel of"),
     ],
 )
