@@ -1,7 +1,7 @@
 """The loop in which a policy steers ships through episodes of a task, side by side."""
 
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,19 +119,31 @@ def rollout(
         looks.append(_look(engine, record))
         sailing = sailing & ~(terminated | truncated)
         starts = np.zeros_like(starts)
+    ends = {"costs": costs, "terminated": ended, "failed": failed}
+    return _rollout(engine, seeds, helmsman, sailed, looks, **ends)
+
+
+def _rollout(
+    engine: Engine,
+    seeds: ArrayLike,
+    helmsman: "_Helmsman",
+    sailed: list[Flags],
+    looks: list[tuple[Histories, Histories]],
+    **ends: Any,
+) -> Rollout:
+    """All that was noted of episodes."""
+    states, infos = zip(*looks, strict=True)
     return Rollout(
         task=engine.task,
         model=engine.model,
         dt=engine.dt,
         seeds=np.asarray(seeds),
-        costs=costs,
-        sailing=np.array(sailed, dtype=np.bool_).reshape(-1, n),
-        terminated=ended,
-        failed=failed,
+        sailing=np.array(sailed, dtype=np.bool_).reshape(-1, engine.num_envs),
         failure=helmsman.failure,
         seconds_per_action=helmsman.seconds / max(helmsman.n_commands, 1),
-        states=_stacked([states for states, _ in looks]),
-        infos=_stacked([infos for _, infos in looks]),
+        states=_stacked(states),
+        infos=_stacked(infos),
+        **ends,
     )
 
 
@@ -229,6 +241,6 @@ def _no_number(values: NDArray[np.float32], missing: Flags, sailing: Flags) -> s
     )
 
 
-def _stacked(records: list[Histories]) -> Histories:
+def _stacked(records: Sequence[Histories]) -> Histories:
     """Histories by name, each of shape (n_records, n)."""
     return {name: np.array([one[name] for one in records]) for name in records[0]}
