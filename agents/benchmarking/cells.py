@@ -1,101 +1,94 @@
-"""Cells of a benchmark: one controller in one task, all of its training runs."""
+"""Cells of a benchmark: one entry in one task, all of its runs and sets of episodes."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from agents.benchmarking.entries import Entry, file_hash
-from agents.suites.suite import FIRST_SEED, BenchmarkTask
+from agents.rollouts.metrics import evaluate
+from agents.suites.benchmark_task import BenchmarkTask, judging_seeds
 from shipgym.arrays import Floats
-from shipgym.checks import check_table
 from shipgym.errors import InputError
 
-#: Types of a cell's fields in a file.
-CELL = {
-    "refused": str,
-    "figures": dict,
-    "failure": str,
-    "seconds_per_action": int | float,
-}
+Figures = dict[str, Floats]
+
+
+class Options(NamedTuple):
+    """What all entries of a benchmark have in common.
+
+    Attributes
+    ----------
+    episodes : int
+        Episodes of each set.
+    seed : int
+        Which episodes: each seed has others.
+    runs : int
+        How often an entry that searches or learns is made.
+    budget : float
+        Most ship steps that making a run may take.
+    """
+
+    episodes: int
+    seed: int
+    runs: int
+    budget: float
 
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """One controller in one task.
+    """One entry in one task.
 
     Attributes
     ----------
     refused : str
         Why it could not run the task; empty if it could.
-    figures : mapping of str to array of shape (n_runs, n_episodes)
-        Figures of each episode by name (`agents.rollouts.metrics`), for each training
-        run; a controller that does not learn has one.
-    failure : str
-        How the controller failed first; empty if it did not.
+    figures : mapping of str to mapping
+        By set of episodes, figures of each episode by name (`agents.rollouts.metrics`),
+        each of shape (n_runs, n_episodes).
+    failures : mapping of str to str
+        By set of episodes, how the controller failed first, if it did.
     seconds_per_action : float
         Processor time of a command, mean over the runs.
+    ship_steps, seconds : float
+        What making a run took: steps of simulated ships, and processor time.
     """
 
     refused: str = ""
-    figures: Mapping[str, Floats] = field(default_factory=dict)
-    failure: str = ""
+    figures: Mapping[str, Figures] = field(default_factory=dict)
+    failures: Mapping[str, str] = field(default_factory=dict)
     seconds_per_action: float = np.nan
+    ship_steps: float = 0.0
+    seconds: float = 0.0
 
-    @property
-    def costs(self) -> Floats:
-        """Cost of each episode, shape (n_runs, n_episodes); no runs where refused."""
-        return self.figures.get("cost", np.zeros((0, 0)))
-
-    def table(self, controller: str, task: str) -> pd.DataFrame:
-        """Return a row for each run and episode, with its seed."""
-        n_runs, n_episodes = self.costs.shape
-        keys = {
-            "controller": controller,
-            "task": task,
-            "run": np.repeat(np.arange(n_runs), n_episodes),
-            "seed": np.tile(FIRST_SEED + np.arange(n_episodes), n_runs),
-        }
-        figures = {name: values.ravel() for name, values in self.figures.items()}
-        return pd.DataFrame({**keys, **figures})
-
-    @classmethod
-    def from_dict(cls, content: Any, n_episodes: int, where: str) -> Self:
-        """Read the result of `run_job`, which may have been kept in a file.
-
-        Raises InputError, beginning with `where`, if it is not of so many episodes.
-        """
-        table = check_table(content, where, CELL, CELL)
-        cell = cls(**table)
-        needed = {"cost", "terminated", "failed"}
-        whole = all(isinstance(table[name], kind) for name, kind in CELL.items())
-        whole = whole and (bool(cell.refused) or needed <= cell.figures.keys())
-        if whole and cell.figures:
-            arrays = [np.asarray(values) for values in cell.figures.values()]
-            n_runs = len(arrays[0]) if arrays[0].ndim else 0
-            for array in arrays:
-                is_number = array.dtype.kind in "bif"
-                whole = whole and is_number and array.shape == (n_runs, n_episodes)
-        if not whole:
-            raise InputError(
-                f"{where}: expected cost and other figures of {n_episodes} episodes"
-            )
-        return cell
+    def table(self, controller: str, task: str, options: Options) -> pd.DataFrame:
+        """Return a row for each set, run and episode, with its seed."""
+        tables = []
+        for on, figures in self.figures.items():
+            n_runs, n_episodes = figures["cost"].shape
+            seeds = judging_seeds(on, n_episodes, options.seed)
+            keys = {
+                "controller": controller,
+                "task": task,
+                "set": on,
+                "run": np.repeat(np.arange(n_runs), n_episodes),
+                "seed": np.tile(seeds, n_runs),
+            }
+            columns = {name: values.ravel() for name, values in figures.items()}
+            tables.append(pd.DataFrame({**keys, **columns}))
+        return pd.concat(tables, ignore_index=True)
 
 
-#: Names of the controller and the task of a cell.
-CellName = tuple[str, str]
-Cells = Mapping[CellName, Cell]
+#: Every cell by the names of its entry and its task.
+Cells = Mapping[tuple[str, str], Cell]
 
 
-def run_cell(entry: Entry, task: BenchmarkTask, n_episodes: int) -> Cell:
-    """Run the first scored episodes of a task with every training run of an entry."""
-    from agents.rollouts.metrics import evaluate  # whoever shares work out does without
-
+def run_cell(entry: Entry, task: BenchmarkTask, options: Options) -> Cell:
+    """Make an entry for a task and steer all sets of episodes with each of its runs."""
     try:
-        policies = entry.policies(task)
+        made = entry.made(task, options.runs, options.budget)
     except InputError as error:
         return Cell(refused=str(error))
     except Exception as error:
@@ -104,21 +97,28 @@ def run_cell(entry: Entry, task: BenchmarkTask, n_episodes: int) -> Cell:
         # a user's own function may raise anything
         return Cell(refused=f"{type(error).__name__}: {error}")
 
-    seeds = task.seeds[:n_episodes]
-    sailed = [evaluate(policy, task, seeds) for policy in policies]
-    figures = {}
-    for name in sailed[0].figures:
-        figures[name] = np.stack([one.figures[name] for one in sailed])
-    failures = [one.run.failure for one in sailed if one.run.failure]
-    seconds = [one.run.seconds_per_action for one in sailed]
+    figures: dict[str, Figures] = {}
+    failures: dict[str, str] = {}
+    seconds = []
+    for on in task.sets:
+        seeds = judging_seeds(on, options.episodes, options.seed)
+        sailed = [evaluate(policy, task, seeds, on) for policy in made.policies]
+        figures[on] = {}
+        for name in sailed[0].figures:
+            figures[on][name] = np.stack([one.figures[name] for one in sailed])
+        failed = [one.run.failure for one in sailed if one.run.failure]
+        failures |= dict.fromkeys([on], failed[0]) if failed else {}
+        seconds += [one.run.seconds_per_action for one in sailed]
     return Cell(
         figures=figures,
-        failure=failures[0] if failures else "",
+        failures=failures,
         seconds_per_action=float(np.mean(seconds)),
+        ship_steps=made.ship_steps,
+        seconds=made.seconds,
     )
 
 
-def job_of(entry: Entry, task: BenchmarkTask, n_episodes: int) -> dict[str, Any]:
+def job_of(entry: Entry, task: BenchmarkTask, options: Options) -> dict[str, Any]:
     """Return the job of a cell; it names all that the result depends on."""
     task_files = {str(path): file_hash(path) for path in task.files}
     return {
@@ -126,12 +126,12 @@ def job_of(entry: Entry, task: BenchmarkTask, n_episodes: int) -> dict[str, Any]
         "entry": entry.name,
         "source": entry.source,
         "files": {**entry.fingerprint(task), **task_files},
-        "episodes": n_episodes,
+        "options": options._asdict(),
     }
 
 
 def run_job(job: dict[str, Any]) -> dict[str, Any]:
-    """Do a job of `job_of`, in any process; `Cell.from_dict` reads the result."""
+    """Do a job of `job_of`, in any process; a `Cell` as a dict."""
     entry = Entry(job["entry"], job["source"])
-    task = BenchmarkTask.from_dict(job["task"])
-    return asdict(run_cell(entry, task, job["episodes"]))
+    task = BenchmarkTask(**job["task"])
+    return asdict(run_cell(entry, task, Options(**job["options"])))

@@ -3,30 +3,38 @@
 A controller is named, on the command line and in Python, as
 
     pid                   a classical controller, designed for the model of each task
-    tuned-pid             the same with the settings of direct search for the task
-    tuned-best            of these, the one with the lowest cost in each task
+    tuned-pid             the same with the settings of direct searches for the task
     ppo                   the shipped agent of the environment (agents/pretrained)
     rule                  the rule in the file of the task (shipgym.tasks.contract)
     runs/agent.json       a file of an agent or controller
-    runs/{task}-*.json    one file for each task; several that match are training runs
+    runs/{task}-*.json    one file for each task; several that match are runs
     my_module:factory     a function that returns a controller for a `BenchmarkTask`,
                           or a subclass of `agents.Controller`; its code is run
     name=...              any of these under another name
+
+Runs are the unit: what searches or learns is made several times. A function that takes
+`seed` is called with 0, 1, ...; of a tuned controller each search is a run.
 """
 
 import glob
 import hashlib
-import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import inspect
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
+from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from agents.agent_file import PRETRAINED, load_agent
 from agents.controllers.controller import Controller
-from agents.controllers.designs import design, tuned
+from agents.controllers.designs import design, tuned, tuned_runs
 from agents.controllers.interface import Policy, check_fits, model_hash
 from agents.controllers.registry import (
     CLASSICAL,
@@ -36,7 +44,9 @@ from agents.controllers.registry import (
 )
 from agents.controllers.task_rule import TaskRule
 from agents.suites.suite import BenchmarkTask
+from shipgym import load_model
 from shipgym.checks import did_you_mean, quoted
+from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.files import LARGEST_TENSORS, read_bytes
 from shipgym.python_files import working_folder
@@ -44,6 +54,23 @@ from shipgym.python_files import working_folder
 SHIPPED = "ppo"  # agents of agents/pretrained, one for each environment
 RULE = "rule"  # of the task's own file
 TUNED = "tuned-"
+
+
+class Made(NamedTuple):
+    """Controllers of an entry for a task, one for each run, and what they took.
+
+    Attributes
+    ----------
+    policies : list of Policy
+    ship_steps : float
+        Control intervals that ships were simulated for, mean over the runs.
+    seconds : float
+        Processor time, mean over the runs.
+    """
+
+    policies: list[Policy]
+    ship_steps: float
+    seconds: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +83,7 @@ class Entry:
         Its name in tables and files.
     source : str, controller, callable or sequence
         A text as in the module's docstring, a controller, a function that returns one
-        for a `BenchmarkTask`, or several of the latter two, each a training run.
+        for a `BenchmarkTask`, or several of the latter two, each a run.
     """
 
     name: str
@@ -72,28 +99,38 @@ class Entry:
         """Return whether it is `module:function`, whose code is run."""
         return self.is_text and names_code(self.source)
 
-    @property
-    def is_file(self) -> bool:
-        """Return whether it is read from files that the user names."""
-        return self.is_text and not self.is_code and self.source not in known_names()
-
-    def policies(self, task: BenchmarkTask) -> list[Policy]:
-        """Make its controllers for a task, one for each training run.
+    def made(self, task: BenchmarkTask, runs: int = 1, budget: float = inf) -> Made:
+        """Make its controllers for a task, at most so many runs.
 
         Raises InputError if it cannot be made for this task, observes other quantities,
-        or was designed on the ship that it should not know.
+        was designed on the ship that it should not know, or took more ship steps than
+        the budget.
         """
         where = f"'{self.name}' on task '{task.name}'"
         given = task.design_task
-        policies = _policies(self.source, given)
+        before, began = Engine.ship_steps, time.process_time()
+        policies = _policies(self.source, given, runs)
+        steps = (Engine.ship_steps - before) / len(policies)
+        seconds = (time.process_time() - began) / len(policies)
+        if self.is_text and self.source.startswith(TUNED):
+            kind = _kind(self.source.removeprefix(TUNED), given)
+            found = tuned_runs(kind, given, given.suite)
+            steps = float(np.mean([run.get("ship_steps", 0) for run in found]))
+            seconds = float(np.mean([run.get("seconds", 0.0) for run in found]))
+        if steps > budget:
+            raise InputError(
+                f"{where}: expected at most {budget:,.0f} ship steps in making a run,"
+                f" got {steps:,.0f}; search or train for less"
+            )
+        hidden = model_hash(load_model(task.true_ship)) if task.true_ship else None
         for policy in policies:
             check_fits(policy, given.task, given.ship, where)
-            if task.true_ship and _holds(policy, model_hash(task.evaluation.ship)):
+            if hidden and _holds(policy, hidden):
                 raise InputError(
                     f"{where}: expected a design on the model '{task.model}', got one"
                     f" on the ship '{task.true_ship}'"
                 )
-        return policies
+        return Made(policies, steps, seconds)
 
     def fingerprint(self, task: BenchmarkTask) -> dict[str, str]:
         """Return the SHA-256 of each file that it is made from for a task, by path."""
@@ -104,7 +141,7 @@ class Entry:
 
 def known_names() -> tuple[str, ...]:
     """Names that stand for a controller, other than files and functions."""
-    tuned_names = [TUNED + kind for kind in ("best", *CLASSICAL)]
+    tuned_names = [TUNED + kind for kind in CLASSICAL]
     return (*controller_kinds(), SHIPPED, RULE, *tuned_names)
 
 
@@ -132,80 +169,42 @@ def read_entries(controllers: Any) -> tuple[Entry, ...]:
         Texts, several in one separated by commas; entries; controllers; functions; or
         any of these by name.
     """
+    if isinstance(controllers, str):
+        controllers = controllers.split(",")
+    elif hasattr(controllers, "predict") or not isinstance(controllers, Iterable):
+        controllers = [controllers]
+    named = [_named(one) for one in controllers]
+    if isinstance(controllers, Mapping):
+        named = [(str(name), source) for name, source in controllers.items()]
+
     entries: dict[str, Entry] = {}
-    for entry in _each_entry(controllers):
-        name = entry.name
-        if name in entries:
+    for name, source in named:
+        if not name or name in entries:
             raise InputError(
-                f"controllers: expected different names, got '{name}' twice; name one"
-                f" of them: other={name}"
+                "controllers: expected different names before '=', got"
+                f" '{name}' {'twice' if name else ''}; name one of them: other={name}"
             )
-        entries[name] = entry
+        if isinstance(source, str):
+            _check_text(source)
+        else:
+            for one in source if isinstance(source, Sequence) else [source]:
+                _check_object(one, name)
+        entries[name] = Entry(name, source)
     if not entries:
         raise InputError("controllers: expected at least one, got none")
     return tuple(entries.values())
 
 
-def check_agents(entry: Entry, tasks: Sequence[BenchmarkTask]) -> None:
-    """Refuse files of agents that cannot be read or fit none of the tasks.
-
-    Called before anything is run. Raises InputError naming the file.
-    """
-    if not entry.is_file:
-        return
-    refusals = []
-    for task in tasks:
-        try:
-            entry.policies(task)
-        except InputError as error:
-            refusals.append(error)
-        else:
-            return
-    raise InputError(
-        f"controllers: '{entry.name}' fits none of the tasks: {refusals[0]}"
-    )
-
-
-def _each_entry(controllers: Any) -> Iterator[Entry]:
-    if isinstance(controllers, Mapping):
-        for name, source in controllers.items():
-            yield _named(str(name), source)
-        return
-    if isinstance(controllers, str):
-        controllers = controllers.split(",")
-    elif hasattr(controllers, "predict") or not isinstance(controllers, Iterable):
-        controllers = [controllers]
-    for given in controllers:
-        yield _read_entry(given)
-
-
-def _read_entry(given: Any) -> Entry:
+def _named(given: Any) -> tuple[str, Any]:
+    """Name and source of an entry that was given without a mapping."""
     if isinstance(given, Entry):
-        return given
+        return given.name, given.source
     if isinstance(given, str):
-        name, equals, source = given.partition("=")
-        if equals:
-            return _named(name.strip(), source.strip())
-        text = given.strip()
-        return _named(_short_name(text), text)
-
+        name, equals, source = (part.strip() for part in given.partition("="))
+        return (name, source) if equals else (_short_name(name), name)
     # an object is known by its name, a function by its own, others by their class
-    own_name: Any = getattr(given, "name", None)
-    if not own_name:
-        own_name = getattr(given, "__name__", type(given).__name__)
-    return _named(str(own_name), given)
-
-
-def _named(name: str, source: Any) -> Entry:
-    if not name:
-        raise InputError("controllers: expected a name before '=', got none")
-    if isinstance(source, str):
-        _check_text(source)
-        return Entry(name, source)
-    runs = source if isinstance(source, Sequence) else [source]
-    for run in runs:
-        _check_object(run, name)
-    return Entry(name, source)
+    own: Any = getattr(given, "name", None) or getattr(given, "__name__", "")
+    return str(own or type(given).__name__), given
 
 
 def _short_name(text: str) -> str:
@@ -233,14 +232,10 @@ def _check_text(text: str) -> None:
     if text in known or "{task}" in text:
         return
     if names_code(text):
-        package, _, _ = text.partition(":")
-        top, _, _ = package.partition(".")
-        with working_folder():
-            found = top in sys.modules or find_spec(top) is not None
-        if not found:
+        if not _module_files(text):
             raise InputError(
                 f"controllers: expected module:function, got '{text}', whose module"
-                f" '{top}' is not found in this folder or on Python's path"
+                " is not found in this folder or on Python's path"
             )
     elif not _matching_files(text):
         raise InputError(
@@ -259,24 +254,34 @@ def _check_object(source: Any, name: str) -> None:
         )
 
 
-def _policies(source: Any, task: BenchmarkTask) -> list[Policy]:
+def _policies(source: Any, task: BenchmarkTask, runs: int) -> list[Policy]:
     """Make the controllers of a source for a design task."""
     if not isinstance(source, str):
-        runs = source if isinstance(source, Sequence) else [source]
-        return [_policy(run, task) for run in runs]
+        given = source if isinstance(source, Sequence) else [source]
+        return [policy for one in given for policy in _runs(one, task, runs)]
     if names_code(source):
-        return [_policy(_imported(source), task)]
+        return _runs(_imported(source), task, runs)
     if source == RULE:
         return [TaskRule(task.task, task.ship)]
     if source in controller_kinds():
-        return [_designed(source, task)]
+        return [design(_kind(source, task), task)]
     if source.startswith(TUNED):
-        return [tuned(source.removeprefix(TUNED), task, task.suite)]
+        kind = _kind(source.removeprefix(TUNED), task)
+        found = tuned_runs(kind, task, task.suite)[:runs]
+        return [tuned(kind, task, task.suite, run) for run in range(len(found))]
 
     files = source_files(source, task)
     if not files:
         raise InputError(f"there is no file of '{source}' for task '{task.name}'")
     return [load_agent(path) for path in files]
+
+
+def _runs(source: Any, task: BenchmarkTask, runs: int) -> list[Policy]:
+    """Make the runs of a policy, a function or a class of controllers."""
+    is_policy = hasattr(source, "predict")
+    if is_policy or "seed" not in inspect.signature(source).parameters:
+        return [_policy(source, task)]
+    return [_policy(partial(source, seed=seed), task) for seed in range(runs)]
 
 
 def _policy(source: Any, task: BenchmarkTask) -> Policy:
@@ -295,11 +300,10 @@ def _policy(source: Any, task: BenchmarkTask) -> Policy:
     return policy  # type: ignore[no-any-return]
 
 
-def _designed(kind: str, task: BenchmarkTask) -> Policy:
-    """Design a controller; without a path, the LQ that guidance leads."""
-    if controller_class(kind).has_autopilot and not task.task.follows_path:
-        kind = "lq"
-    return design(kind, task)
+def _kind(kind: str, task: BenchmarkTask) -> str:
+    """Kind of controller; without a path, the LQ that guidance leads."""
+    leads = controller_class(kind).has_autopilot
+    return "lq" if leads and not task.task.follows_path else kind
 
 
 def _imported(text: str) -> Any:
@@ -337,18 +341,16 @@ def source_files(text: str, task: BenchmarkTask) -> list[Path]:
         return [agent] if agent.is_file() else []
     if text in known_names():
         return []
-    return _matching_files(text.replace("{task}", task.design_name or task.name))
+    return _matching_files(text.replace("{task}", task.name))
 
 
 def _module_files(text: str) -> list[Path]:
     """File of the module that a function is named in; empty where it has none."""
     module, _, _ = text.rpartition(":")
-    inside = Path(*module.split("."))
-    candidates = (inside.with_suffix(".py"), inside / "__init__.py")
-    for folder in (Path.cwd(), *map(Path, sys.path)):
-        for candidate in candidates:
-            if (folder / candidate).is_file():
-                return [folder / candidate]
+    with working_folder(), suppress(ImportError):
+        spec = find_spec(module)
+        if spec is not None and spec.has_location:
+            return [Path(str(spec.origin))]
     return []
 
 

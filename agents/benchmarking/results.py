@@ -1,16 +1,13 @@
 """Results of a benchmark: a row for each episode, and the summary; both as files.
 
 docs/benchmark.md describes `results.json`; `episodes.parquet` has one row for each
-controller, task, training run and seed.
+controller, task, set of episodes, run and seed.
 """
 
-import json
 import platform
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import cached_property
-from hashlib import sha256
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Self
@@ -18,43 +15,34 @@ from typing import Any, Self
 import numpy as np
 import pandas as pd
 
-from agents.benchmarking.cells import Cell, Cells
-from agents.benchmarking.entries import Entry, file_hash
+from agents.benchmarking.cells import Cells, Options
+from agents.benchmarking.entries import Entry
 from agents.benchmarking.summary import KEYS, Summary
 from agents.controllers.interface import model_hash
 from agents.output import check_writable, present
-from agents.suites.suite import FIRST_SEED, BenchmarkTask, Suite
+from agents.suites.suite import BenchmarkTask, Suite
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_fields, check_format
 from shipgym.drafts import atomic_path
 from shipgym.errors import InputError
 from shipgym.extras import library
-from shipgym.files import (
-    LARGEST_TENSORS,
-    make_folder,
-    read_bytes,
-    read_json,
-    write_json,
-)
+from shipgym.files import make_folder, read_json, write_json
 
 RESULTS, EPISODES, PARTS = "results.json", "episodes.parquet", "parts"
-FORMAT, KIND = 3, "shipgym-benchmark"
+OPTIONS = "options.json"  # among the parts
+FORMAT, KIND = 4, "shipgym-benchmark"
 FIELDS = (
     "format",
     "kind",
     "versions",
     "suite",
-    "seeds",
+    "options",
     "controllers",
-    "rule",
     "tasks",
     "ranking",
-    "episodes",
-    "sha256",
 )
 PACKAGES = ("shipgym", "numpy", "numba", "scipy", "control")
 REMEDY = "run `shipgym benchmark` again"
-MOST_COLUMNS = 200  # of the table of episodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +54,7 @@ class BenchmarkResult:
     summary : dict
         Content of `results.json`.
     episodes : DataFrame
-        One row for each episode: controller, task, run, seed, and figures by name.
+        One row for each episode: controller, task, set, run, seed, and figures by name.
     """
 
     summary: dict[str, Any]
@@ -74,23 +62,21 @@ class BenchmarkResult:
 
     @property
     def ranking(self) -> list[str]:
-        """Names of the controllers, the best first."""
-        return [ranked["name"] for ranked in self.summary["ranking"]]
+        """Names of the controllers, the best of the first part first."""
+        first, *_ = self.summary["ranking"].values()
+        return [ranked["name"] for ranked in first]
 
-    @cached_property
+    @property
     def tasks(self) -> tuple[str, ...]:
         """Names of the tasks."""
         return tuple(self.summary["tasks"])
 
-    @cached_property
-    def seeds(self) -> range:
-        """Seeds of the episodes of each task."""
-        first = self.summary["seeds"]["first"]
-        return range(first, first + self.summary["seeds"]["count"])
+    def cells(self, task: str, on: str = "ship") -> dict[str, Any]:
+        """Return the figures in a task of each controller that could run it.
 
-    def cells(self, task: str) -> dict[str, Any]:
-        """Return the figures in a task of each controller that could run it."""
-        cells: dict[str, Any] = self.summary["tasks"][task]
+        `on`: the set of episodes; there is nothing in one that the task has not.
+        """
+        cells: dict[str, Any] = self.summary["tasks"][task].get(on, {})
         return cells
 
     @property
@@ -102,17 +88,19 @@ class BenchmarkResult:
                 first, *_ = about["refused"].values()
                 tasks = ", ".join(about["refused"])
                 failures.append(f"{name} could not run {tasks}: {first}")
-            for task in self.tasks:
-                cell = self.cells(task).get(name)
-                if cell and cell["failed"]:
-                    failures.append(
-                        f"{name} failed in {cell['failed']} episodes of {task}:"
-                        f" {cell['failure']}"
-                    )
+            for task, sets in self.summary["tasks"].items():
+                for on, cells in sets.items():
+                    if name in cells and cells[name]["failure"]:
+                        failures.append(
+                            f"{name} in {task}, {on}: {cells[name]['failure']}"
+                            f" ({cells[name]['failed']} episodes failed)"
+                        )
         return failures
 
-    def figures(self, controller: str, task: str, name: str = "cost") -> Floats:
-        """Return a figure of each episode, shape (n_runs, n_episodes).
+    def figures(
+        self, controller: str, task: str, name: str = "cost", on: str = "ship"
+    ) -> Floats:
+        """Return a figure of each episode of a set, shape (n_runs, n_episodes).
 
         There are no runs where the controller could not run the task. Raises InputError
         for an unknown controller, task or figure.
@@ -120,41 +108,61 @@ class BenchmarkResult:
         check_choice(controller, self.summary["controllers"], "controller")
         check_choice(task, self.tasks, "task")
         check_choice(name, list(self.episodes), "figure")
-        table = self.episodes
-        rows = (table["controller"] == controller) & (table["task"] == task)
-        figures: Floats = table.loc[rows, name].to_numpy(np.float64)
-        return figures.reshape(-1, len(self.seeds))
+        rows = self.episodes.query("controller == @controller and task == @task")
+        figures: Floats = rows.loc[rows["set"] == on, name].to_numpy(np.float64)
+        return figures.reshape(-1, self.summary["options"]["episodes"])
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a row for each controller in each set of episodes of each task.
+
+        With mean cost and score, each with its interval, what was lost and failed, and
+        the mean of each figure.
+        """
+        rows = []
+        for task, sets in self.summary["tasks"].items():
+            for on, cells in sets.items():
+                for name, cell in cells.items():
+                    row = {"controller": name, "task": task, "set": on}
+                    for part in ("cost", "score"):
+                        low, high = cell[part]["low"], cell[part]["high"]
+                        row |= {part: cell[part]["value"]}
+                        row |= {f"{part}_low": low, f"{part}_high": high}
+                    row |= {part: cell[part] for part in ("runs", "lost", "failed")}
+                    metrics = cell["metrics"].items()
+                    rows.append({**{one: of["mean"] for one, of in metrics}, **row})
+        return pd.DataFrame(rows)
 
     def save(self, folder: str | Path) -> Self:
         """Write `episodes.parquet` and then `results.json`, each whole or not at all.
 
-        Returns the result with the hash of `episodes.parquet` in its summary. Raises
-        InputError if pyarrow is missing or the folder cannot be written.
+        Returns the result itself. Raises InputError if pyarrow is missing or the folder
+        cannot be written.
         """
         _pyarrow()
         target = Path(folder)
         make_folder(target)
-        table = target / EPISODES
-        with atomic_path(table) as draft:
+        with atomic_path(target / EPISODES) as draft:
             self.episodes.to_parquet(draft, engine="pyarrow", index=False)
-
-        about_table = {**self.summary["episodes"], "sha256": file_hash(table)}
-        summary = {**self.summary, "episodes": about_table}
-        summary["sha256"] = _summary_hash(summary)
-        write_json(summary, target / RESULTS)
-        return replace(self, summary=summary)
+        write_json(self.summary, target / RESULTS)
+        return self
 
 
 def _pyarrow() -> Any:
-    """Return pyarrow's module for Parquet; InputError says how it is installed."""
-    return library("pyarrow.parquet", "benchmark", "the table of episodes needs it")
+    """Return pyarrow; InputError says how it is installed."""
+    return library("pyarrow", "benchmark", "the table of episodes needs it")
 
 
-def check_new(folder: Path, resume: bool, suite: str) -> Path:
-    """Refuse a folder that cannot take results.
+def check_new(
+    folder: Path,
+    resume: bool,
+    suite: Suite,
+    tasks: Sequence[BenchmarkTask],
+    options: Options,
+) -> Path:
+    """Refuse a folder that cannot take results, and note what they are of.
 
-    One that holds results is for `resume`, if they are of this suite. Raises InputError
-    saying what to do.
+    One that holds results is for `resume`, if they are of the same suite, tasks and
+    options. Raises InputError saying what to do.
     """
     _pyarrow()  # a missing extra is reported now, not after the work
     if folder.exists() and not folder.is_dir():
@@ -174,13 +182,22 @@ def check_new(folder: Path, resume: bool, suite: str) -> Path:
             f"{folder}: already contains results; continue with --resume (resume=True),"
             " or choose another folder"
         )
-    if RESULTS in names:
-        other = load_results(folder).summary["suite"]["name"]
-        if other != suite:
-            raise InputError(
-                f"{folder}: expected results of suite '{suite}', got those of"
-                f" '{other}'; choose another folder"
-            )
+    asked = {
+        "suite": f"{suite.name} ({suite.sha256[:16]})",
+        "tasks": [task.name for task in tasks],
+        **options._asdict(),
+    }
+    note = folder / PARTS / OPTIONS
+    if has_results:
+        known = read_json(note, "file of options", "choose another folder")
+        for name, value in asked.items():
+            if known.get(name) != value:
+                raise InputError(
+                    f"{folder}: {name}: expected that of its results,"
+                    f" {known.get(name)!r}, got {value!r}; choose another folder"
+                )
+    make_folder(note.parent)
+    write_json(asked, note)
     return folder
 
 
@@ -189,58 +206,51 @@ def collect(
     tasks: Sequence[BenchmarkTask],
     entries: Sequence[Entry],
     cells: Cells,
-    rule: str,
-    rule_cells: Mapping[str, Cell],
+    rules: Mapping[str, str],
+    options: Options,
 ) -> BenchmarkResult:
     """Put together what was run.
 
-    `cells` has every entry in every task, by the names of both; `rule_cells` the
-    controller `rule`, which scores are relative to, by the name of the task.
+    `cells` has every entry in every task, by the names of both, and of each task that
+    of its rule, whose name `rules` has. Raises InputError if no entry could run any
+    task.
     """
-    computed = Summary(tasks, [entry.name for entry in entries], cells, rule_cells)
-    episodes = computed.episodes
+    own = [cells[entry.name, task.name] for entry in entries for task in tasks]
+    if all(cell.refused for cell in own):
+        raise InputError(
+            f"controllers: no controller could run any task; '{entries[0].name}' in"
+            f" '{tasks[0].name}': {own[0].refused}"
+        )
+    names = [entry.name for entry in entries]
+    computed = Summary(suite, tasks, names, cells, rules, options)
     by_task = computed.by_task()
-    rule_costs = {}
-    for number, costs in computed.rule_costs.items():
-        rule_costs[tasks[number].name] = float(costs.mean())
-    controllers = {}
-    for entry in entries:
-        controllers[entry.name] = _about_entry(entry, tasks, cells)
+    about_tasks = {}
+    for task in tasks:
+        about_tasks[task.name] = {
+            **task.to_dict(),
+            "model_sha256": model_hash(task.ship),
+            "gap": computed.gap(task.name, by_task),
+        }
+    source = Path(suite.source)
     summary = {
         "format": FORMAT,
         "kind": KIND,
         "versions": versions(),
-        "suite": _about_suite(suite, tasks),
-        "seeds": {"first": FIRST_SEED, "count": episodes["seed"].nunique()},
-        "controllers": controllers,
-        "rule": {"controller": rule, "costs": rule_costs},
+        "suite": {
+            "name": suite.name,
+            "sha256": suite.sha256,
+            "file": source.name if source.suffix == ".toml" else "",
+            "n_tasks": len(suite.tasks),
+            "tasks": about_tasks,
+        },
+        "options": options._asdict(),
+        "controllers": {
+            entry.name: _about_entry(entry, tasks, cells) for entry in entries
+        },
         "tasks": by_task,
-        "ranking": computed.ranking(by_task),
-        "episodes": {"file": EPISODES, "rows": len(episodes), "sha256": None},
+        "ranking": computed.rankings(by_task),
     }
-    return BenchmarkResult(summary, episodes)
-
-
-def _about_suite(suite: Suite, tasks: Sequence[BenchmarkTask]) -> dict[str, Any]:
-    source = Path(suite.source)
-    about_tasks = {}
-    for task in tasks:
-        about_tasks[task.name] = {
-            "environment": task.environment,
-            "model": task.model,
-            "model_sha256": model_hash(task.ship),
-            "why": task.why,
-            "limits": dict(task.limits),
-            "on": task.on,
-            "ship": task.true_ship,
-        }
-    return {
-        "name": suite.name,
-        "sha256": suite.sha256,
-        "file": source.name if source.suffix == ".toml" else "",
-        "complete": len(tasks) == len(suite.tasks),
-        "tasks": about_tasks,
-    }
+    return BenchmarkResult(summary, computed.episodes)
 
 
 def versions() -> dict[str, str]:
@@ -263,19 +273,16 @@ def _about_entry(
     cells: Cells,
 ) -> dict[str, Any]:
     files: dict[str, str] = {}
-    refused: dict[str, str] = {}
-    n_runs = 0
     for task in tasks:
-        cell = cells[entry.name, task.name]
         files |= entry.fingerprint(task)
-        n_runs = max(n_runs, len(cell.costs))
-        if cell.refused:
-            refused[task.name] = cell.refused
+    own = {task.name: cells[entry.name, task.name] for task in tasks}
+    made = [cell for cell in own.values() if not cell.refused]
     return {
         "source": entry.source if entry.is_text else None,
         "files": files,
-        "runs": n_runs,
-        "refused": refused,
+        "refused": {name: cell.refused for name, cell in own.items() if cell.refused},
+        "ship_steps": float(np.mean([cell.ship_steps for cell in made] or [0.0])),
+        "seconds": float(np.mean([cell.seconds for cell in made] or [0.0])),
     }
 
 
@@ -294,45 +301,16 @@ def load_results(path: str | Path) -> BenchmarkResult:
         )
     check_format(summary, FORMAT, str(where))
     check_fields(summary, FIELDS, str(where), REMEDY)
-    if summary["sha256"] != _summary_hash(summary):
-        raise InputError(
-            f"{where}: expected what the benchmark wrote, got other content; remove it"
-            " and run `shipgym benchmark --resume` again"
-        )
-    episodes = _read_episodes(where.with_name(EPISODES), summary["episodes"])
-    return BenchmarkResult(dict(summary), episodes)
-
-
-def _summary_hash(summary: Mapping[str, Any]) -> str:
-    """SHA-256 of a summary without its own hash."""
-    content = {name: value for name, value in summary.items() if name != "sha256"}
-    return sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-
-
-def _read_episodes(path: Path, about: Mapping[str, Any]) -> pd.DataFrame:
-    """Read the table that was written with a summary, which tells its hash and size."""
-    content = read_bytes(path, "file of episodes", LARGEST_TENSORS)
-    if about["sha256"] != file_hash(path):
-        raise InputError(
-            f"{path}: expected the file that {RESULTS} was written with, got another"
-            f" or one that is cut short; {REMEDY}"
-        )
-    parquet = _pyarrow()
-    pyarrow = library("pyarrow", "benchmark", "the table of episodes needs it")
+    table = where.with_name(EPISODES)
+    _pyarrow()
     try:
-        file = parquet.ParquetFile(pyarrow.BufferReader(content))
-        size = file.metadata
-        is_small = size.num_columns <= MOST_COLUMNS
-        if size.num_rows != about["rows"] or not is_small:
-            raise ValueError(
-                f"{size.num_rows} rows of {size.num_columns} columns instead of"
-                f" {about['rows']} rows"
-            )
-        table: pd.DataFrame = file.read().to_pandas(ignore_metadata=True)
-        numbers = table.columns.difference(["controller", "task"])
-        return table.astype(dict.fromkeys(numbers.difference(KEYS), np.float64))
-    except (OSError, pyarrow.ArrowException, ValueError, TypeError) as error:
+        episodes = pd.read_parquet(table, engine="pyarrow")
+        missing = [name for name in (*KEYS, "cost") if name not in episodes]
+        if missing:
+            raise ValueError(f"no column '{missing[0]}'")
+    except (OSError, ValueError) as error:
         raise InputError(
-            f"{path}: expected a table of episodes, got one that cannot be read"
+            f"{table}: expected a table of episodes, got one that cannot be read"
             f" ({error}); {REMEDY}"
         ) from None
+    return BenchmarkResult(dict(summary), episodes)

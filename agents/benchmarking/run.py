@@ -1,4 +1,4 @@
-"""The benchmark: every controller in every task of a suite, the same episodes."""
+"""The benchmark: every entry in every task of a suite, the same episodes."""
 
 import shutil
 from collections.abc import Sequence
@@ -8,19 +8,12 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from agents.benchmarking.cells import Cell, CellName, job_of, run_cell, run_job
-from agents.benchmarking.entries import Entry, check_agents, read_entries
+from agents.benchmarking.cells import Cell, Options, job_of, run_cell, run_job
+from agents.benchmarking.entries import Entry, read_entries
 from agents.benchmarking.results import PARTS, BenchmarkResult, check_new, collect
 from agents.jobs import JobEngine, run_jobs
 from agents.output import in_use
-from agents.suites.suite import (
-    DEFAULT_SUITE,
-    N_EPISODES,
-    BenchmarkTask,
-    Suite,
-    load_suite,
-    suite_file,
-)
+from agents.suites.suite import DEFAULT_SUITE, N_EPISODES, load_suite
 from identification.progress import Progress
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
@@ -38,20 +31,22 @@ def benchmark(
     address: str | None = None,
     resume: bool = False,
     episodes: int = N_EPISODES,
+    seed: int = 0,
+    runs: int = 1,
     allow_code: Sequence[str] = (),
 ) -> BenchmarkResult:
     """Run controllers through the tasks of a suite and rank them.
 
     Returns results that are the same wherever the work is done, but for the times.
-    Raises InputError for an unknown controller, suite or task, a broken agent or one
-    that fits no task, a folder in use, or if no controller could run any task.
+    Raises InputError for an unknown controller, suite or task, a folder in use or of
+    other options, or if no controller could run any task.
 
     Parameters
     ----------
     controllers : str, sequence, or mapping of str
         What is compared: texts such as ``"pid,lq"`` (`agents.benchmarking.entries`),
         controllers, functions of a `BenchmarkTask` that return one; or any of these by
-        name, a list being the training runs of one controller.
+        name, a list being the runs of one controller.
     suite : str or Path
         Name of a shipped suite, or the TOML file of your own.
     tasks : str or sequence of str, optional
@@ -67,6 +62,10 @@ def benchmark(
         Go on in a folder of results: what is there already is not run again.
     episodes : int
         How many of the scored ones; fewer are for a quick look, not for a ranking.
+    seed : int
+        Which episodes are scored: each seed has others.
+    runs : int
+        How often an entry that searches or learns is made.
     allow_code : sequence of str
         Python files and modules that a suite of your own may name.
     """
@@ -74,79 +73,40 @@ def benchmark(
     the_suite = load_suite(suite, allow_code)
     selected = the_suite.select(tasks)
     check_whole(episodes, "episodes", at_least=1, at_most=N_EPISODES)
+    check_whole(seed, "seed", at_least=0, at_most=9999)
+    check_whole(runs, "runs", at_least=1)
+    options = Options(episodes, seed, runs, the_suite.budget)
     where = JobEngine(engine, workers, address)
-    for entry in entries:
-        check_agents(entry, selected)
-    if out is None:
-        return _run(the_suite, selected, entries, episodes, where, progress)
+    everyone = {entry.source: entry for entry in entries if entry.is_text}
+    for task in selected:
+        # no other entry has no name
+        everyone.setdefault(task.rule, Entry(f" {task.rule}", task.rule))
 
-    folder = check_new(Path(out), resume, the_suite.name)
-    parts = folder / PARTS
-    where = replace(where, keep=parts)
+    def run(where: JobEngine) -> BenchmarkResult:
+        jobs = {}
+        cells = {}
+        for entry, task in product(
+            dict.fromkeys([*entries, *everyone.values()]), selected
+        ):
+            is_wanted = entry in entries or entry.source == task.rule
+            if is_wanted and entry.is_text:
+                jobs[entry.name, task.name] = job_of(entry, task, options)
+            elif is_wanted:  # no other process can make objects
+                cells[entry.name, task.name] = run_cell(entry, task, options)
+        on_progress = progress and partial(progress, "tasks done")
+        results = run_jobs(run_job, list(jobs.values()), where, on_progress)
+        for name, result in zip(jobs, results, strict=True):
+            cells[name] = Cell(**result)
+        rules = {task.name: everyone[task.rule].name for task in selected}
+        return collect(the_suite, selected, entries, cells, rules, options)
+
+    if out is None:
+        return run(where)
+    folder = check_new(Path(out), resume, the_suite, selected, options)
     with in_use(folder):
         try:
-            result = _run(the_suite, selected, entries, episodes, where, progress)
-        except NoResultsError:
+            return run(replace(where, keep=folder / PARTS)).save(folder)
+        except InputError:  # nothing that could be kept
             if not resume:
-                shutil.rmtree(parts, ignore_errors=True)
+                shutil.rmtree(folder / PARTS)
             raise
-        return result.save(folder)
-
-
-class NoResultsError(InputError):
-    """No controller could run any task."""
-
-
-def _run(
-    suite: Suite,
-    tasks: Sequence[BenchmarkTask],
-    entries: Sequence[Entry],
-    n_episodes: int,
-    where: JobEngine,
-    progress: Progress | None,
-) -> BenchmarkResult:
-    rule = rule_of(suite)
-    others = {entry.source: entry for entry in entries if entry.is_text}
-    rule_entry = others.get(rule, Entry("", rule))  # no other entry has no name
-    everyone = dict.fromkeys([*entries, rule_entry])
-    cells = _run_cells(list(everyone), tasks, n_episodes, where, progress)
-    own = [cells[entry.name, task.name] for entry in entries for task in tasks]
-    if all(cell.refused for cell in own):
-        raise NoResultsError(
-            f"controllers: no controller could run any task; '{entries[0].name}' in"
-            f" '{tasks[0].name}': {own[0].refused}"
-        )
-    rule_cells = {task.name: cells[rule_entry.name, task.name] for task in tasks}
-    return collect(suite, tasks, entries, cells, rule, rule_cells)
-
-
-def rule_of(suite: Suite) -> str:
-    """Controller whose cost scores are relative to: tuned, where the suite has that."""
-    has_settings = suite_file(suite.source, "tuned").exists()
-    return "tuned-preview-lq" if has_settings else "preview-lq"
-
-
-def _run_cells(
-    entries: Sequence[Entry],
-    tasks: Sequence[BenchmarkTask],
-    n_episodes: int,
-    where: JobEngine,
-    progress: Progress | None,
-) -> dict[CellName, Cell]:
-    """Run every entry in every task; cells by the names of both."""
-    cells: dict[CellName, Cell] = {}
-    jobs: dict[CellName, dict[str, Any]] = {}
-    for entry, task in product(entries, tasks):
-        if entry.is_text:
-            jobs[entry.name, task.name] = job_of(entry, task, n_episodes)
-    on_progress = progress and partial(progress, "tasks done")
-    results = run_jobs(run_job, list(jobs.values()), where, on_progress)
-    for (name, task_name), result in zip(jobs, results, strict=True):
-        part = f"part of '{name}' on '{task_name}'"
-        cells[name, task_name] = Cell.from_dict(result, n_episodes, part)
-
-    # no other process can make objects
-    for entry, task in product(entries, tasks):
-        if not entry.is_text:
-            cells[entry.name, task.name] = run_cell(entry, task, n_episodes)
-    return cells

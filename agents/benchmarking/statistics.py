@@ -1,13 +1,11 @@
 """Statistics of costs and scores, as in rliable, with episodes drawn as well.
 
 A score is the cost of the rule over that of a controller: 1 as cheap as the rule, above
-1 cheaper. Costs have the shape (n_runs, n_episodes), runs being training runs of a
-learned agent; a controller that is not trained has one. `task` and `controller` are
-numbers.
+1 cheaper. Costs have the shape (n_runs, n_episodes), by task.
 
 The bootstrap is stratified: in every task runs and, within them, episodes are drawn
 with replacement. All controllers get the same draws of episodes, because they all ran
-the same ones: differences are paired.
+the same ones: differences are paired. Equal costs are drawn alike.
 
 Sources: Agarwal, Schwarzer, Castro, Courville & Bellemare 2021, Deep Reinforcement
 Learning at the Edge of the Statistical Precipice, NeurIPS 34 (stratified bootstrap,
@@ -29,38 +27,32 @@ Interval = dict[str, float | None]
 
 
 class Draws:
-    """Bootstrap draws of the episodes of each task, the same for every controller.
+    """Bootstrap draws of episodes and runs, the same for every controller.
 
     Parameters
     ----------
-    n_tasks, n_episodes : int
-        Number of tasks, and of episodes of each.
+    n_episodes : int
+        Number of episodes of each task.
     seed : int
         Seed of the draws.
     n_draws : int
         Number of draws of each task; each takes `n_episodes` with replacement.
     """
 
-    def __init__(
-        self, n_tasks: int, n_episodes: int, seed: int = 0, n_draws: int = 2000
-    ) -> None:
+    def __init__(self, n_episodes: int, seed: int = 0, n_draws: int = 2000) -> None:
+        self.n_episodes = n_episodes
         self.n_draws = n_draws
         self.seed = seed
-        random = np.random.default_rng([seed, 0])
-        even = np.full(n_episodes, 1.0 / n_episodes)
-        size = n_tasks, n_draws
-        counts: Integers = random.multinomial(n_episodes, even, size)
-        #: Share of each episode in a draw, shape (n_tasks, n_draws, n_episodes).
-        self.shares: Floats = counts / n_episodes
 
-    def means(self, values: Floats, task: int, controller: int = 0) -> Floats:
+    def means(self, values: Floats, task: str) -> Floats:
         """Means over drawn runs and episodes of a task, shape (n_draws,).
 
         `values`: shape (n_runs, n_episodes).
         """
-        by_run = self.shares[task] @ values.T
-        n_runs = len(values)
-        random = np.random.default_rng([self.seed, 1, task, controller])
+        n_runs, n = values.shape
+        random = np.random.default_rng([self.seed, *task.encode()])
+        counts: Integers = random.multinomial(n, np.full(n, 1.0 / n), self.n_draws)
+        by_run = counts / n @ values.T
         runs = random.integers(n_runs, size=(self.n_draws, n_runs))
         means: Floats = np.take_along_axis(by_run, runs, axis=1).mean(axis=1)
         return means
@@ -74,57 +66,52 @@ def interval(value: float, draws: Floats) -> Interval:
     return {"value": finite(value), "low": finite(low), "high": finite(high)}
 
 
-def mean_cost(costs: Floats, draws: Draws, task: int, controller: int = 0) -> Interval:
+def mean_cost(costs: Mapping[str, Floats], draws: Draws) -> Interval:
     """Mean over runs and episodes of one task."""
-    return interval(float(costs.mean()), draws.means(costs, task, controller))
+    ((task, values),) = costs.items()
+    return interval(float(values.mean()), draws.means(values, task))
 
 
 def mean_score(
-    costs: Mapping[int, Floats],
-    rule_costs: Mapping[int, Floats],
-    draws: Draws,
-    controller: int = 0,
+    costs: Mapping[str, Floats], rule_costs: Mapping[str, Floats], draws: Draws
 ) -> Interval:
     """Geometric mean over tasks of the scores: every task counts the same.
 
     Parameters
     ----------
-    costs : mapping of int to array of shape (n_runs, n_episodes)
+    costs : mapping of str to array of shape (n_runs, n_episodes)
         Costs of a controller by task.
-    rule_costs : mapping of int to array of shape (1, n_episodes)
+    rule_costs : mapping of str to array of shape (n_runs, n_episodes)
         Costs of the rule by task; tasks without them do not count.
     draws : Draws
-    controller : int
     """
     scores = []
     drawn_scores = []
     for task in sorted(costs.keys() & rule_costs.keys()):
         cost, rule_cost = costs[task], rule_costs[task]
-        drawn_cost = draws.means(cost, task, controller)
         scores.append(_score(cost.mean(), rule_cost.mean()))
-        drawn_scores.append(_score(drawn_cost, draws.means(rule_cost, task)))
+        of_rule = draws.means(rule_cost, task)
+        drawn_scores.append(_score(draws.means(cost, task), of_rule))
     if not scores:
         return interval(np.nan, np.zeros(0))
     return interval(float(geometric_mean(scores)), geometric_mean(drawn_scores))
 
 
 def improvement(
-    costs: Mapping[int, Floats],
-    rule_costs: Mapping[int, Floats],
-    draws: Draws,
-    controller: int = 0,
+    costs: Mapping[str, Floats], rule_costs: Mapping[str, Floats], draws: Draws
 ) -> Interval:
-    """Probability that a run costs less than the rule in the same episode.
+    """Probability that a run costs less than one of the rule in the same episode.
 
     Ties count half; the mean over tasks. Parameters are those of `mean_score`.
     """
     shares = []
     drawn_shares = []
     for task in sorted(costs.keys() & rule_costs.keys()):
-        cost, rule_cost = costs[task], rule_costs[task]
+        cost, rule_cost = costs[task][:, None], rule_costs[task]
         wins = (cost < rule_cost) + 0.5 * (cost == rule_cost)
-        shares.append(wins.mean())
-        drawn_shares.append(draws.means(wins, task, controller))
+        by_run = wins.mean(axis=1)
+        shares.append(by_run.mean())
+        drawn_shares.append(draws.means(by_run, task))
     if not shares:
         return interval(np.nan, np.zeros(0))
     return interval(float(np.mean(shares)), np.mean(drawn_shares, axis=0))

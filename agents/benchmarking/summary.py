@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from agents.benchmarking.cells import Cell, Cells
+from agents.benchmarking.cells import Cells, Options
 from agents.benchmarking.statistics import (
     Draws,
     geometric_mean,
@@ -16,12 +16,15 @@ from agents.benchmarking.statistics import (
     mean_cost,
     mean_score,
 )
+from agents.suites.benchmark_task import SETS, BenchmarkTask
 from agents.suites.limits import exceeded
-from agents.suites.suite import SETS, BenchmarkTask
+from agents.suites.suite import Suite
 from shipgym.arrays import Floats, finite
 
 #: Columns of the table of episodes that say what a row is of.
-KEYS = ("controller", "task", "run", "seed")
+KEYS = ("controller", "task", "set", "run", "seed")
+#: Figures of each controller by task and by set of episodes.
+ByTask = Mapping[str, Mapping[str, Mapping[str, Any]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,30 +33,34 @@ class Summary:
 
     Attributes
     ----------
+    suite : Suite
     tasks : sequence of BenchmarkTask
         Those that were run.
     names : sequence of str
         Of the controllers.
     cells : mapping
-        Every controller in every task, by the names of both.
-    rule_cells : mapping of str to Cell
-        The rule in every task.
+        Every controller, and the rule of each task, by the names of both.
+    rules : mapping of str to str
+        Name of the rule in `cells` by task.
+    options : Options
     """
 
+    suite: Suite
     tasks: Sequence[BenchmarkTask]
     names: Sequence[str]
     cells: Cells
-    rule_cells: Mapping[str, Cell]
+    rules: Mapping[str, str]
+    options: Options
 
     @cached_property
     def episodes(self) -> pd.DataFrame:
-        """A row for each controller, task, run and episode; missing figures are NaN."""
+        """A row for each episode of each controller; missing figures are NaN."""
         tables = []
         for name in self.names:
             for task in self.tasks:
                 cell = self.cells[name, task.name]
                 if not cell.refused:
-                    tables.append(cell.table(name, task.name))
+                    tables.append(cell.table(name, task.name, self.options))
         table = pd.concat(tables, ignore_index=True)
         figures = table.columns.difference(KEYS)
         return table.astype(dict.fromkeys(figures, np.float64))
@@ -61,103 +68,107 @@ class Summary:
     @cached_property
     def draws(self) -> Draws:
         """Bootstrap draws that all controllers share."""
-        return Draws(len(self.tasks), self.episodes["seed"].nunique())
+        return Draws(self.options.episodes)
 
-    @cached_property
-    def rule_costs(self) -> dict[int, Floats]:
-        """Costs of the rule by number of the task, where it could run it."""
-        costs = {}
-        for number, task in enumerate(self.tasks):
-            cell = self.rule_cells[task.name]
-            if not cell.refused and cell.costs.mean() > 0.0:
-                costs[number] = cell.costs
-        return costs
+    def costs(self, name: str, on: str, part: str = "") -> dict[str, Floats]:
+        """Costs of a controller by task, those of a part if it is given.
 
-    def by_task(self) -> dict[str, dict[str, Any]]:
-        """Return the figures of each controller in each task that it ran."""
+        Each has the shape (n_runs, n_episodes). The name "" stands for the rules.
+        """
+        found = {}
+        for task in self.tasks:
+            cell = self.cells[name or self.rules[task.name], task.name]
+            is_wanted = not part or task.part == part
+            if is_wanted and on in cell.figures:
+                found[task.name] = cell.figures[on]["cost"]
+        return found
+
+    def by_task(self) -> dict[str, dict[str, dict[str, Any]]]:
+        """Return the figures of each controller in each set that it ran."""
         metrics = _metrics(self.episodes)
-        totals = self.episodes.groupby(["task", "controller"])[["terminated", "failed"]]
-        counts = totals.sum()
-        by_task: dict[str, dict[str, Any]] = {}
-        for number, task in enumerate(self.tasks):
-            by_task[task.name] = {}
-            for controller, name in enumerate(self.names):
+        found: dict[str, dict[str, dict[str, Any]]] = {}
+        for task in self.tasks:
+            found[task.name] = {on: {} for on in task.sets}
+            for on, name in ((on, name) for on in task.sets for name in self.names):
                 cell = self.cells[name, task.name]
                 if cell.refused:
                     continue
-                key = task.name, name
-                by_task[task.name][name] = {
-                    **self._costs(number, controller),
-                    "runs": len(cell.costs),
-                    "lost": int(counts.at[key, "terminated"]),
-                    "failed": int(counts.at[key, "failed"]),
-                    "failure": cell.failure,
-                    "exceeded": exceeded(task.limits, metrics[key]),
+                costs = {task.name: self.costs(name, on)[task.name]}
+                rule = self.costs("", on)
+                figures = cell.figures[on]
+                found[task.name][on][name] = {
+                    "cost": mean_cost(costs, self.draws),
+                    "score": mean_score(costs, rule, self.draws),
+                    "runs": len(figures["cost"]),
+                    "lost": int(figures["terminated"].sum()),
+                    "failed": int(figures["failed"].sum()),
+                    "failure": cell.failures.get(on, ""),
+                    "exceeded": exceeded(task.limits, metrics[task.name, on, name]),
                     "microseconds_per_action": finite(1e6 * cell.seconds_per_action),
-                    "metrics": metrics[key],
+                    "metrics": metrics[task.name, on, name],
                 }
-        return by_task
+        return found
 
-    def _costs(self, task: int, controller: int) -> dict[str, Any]:
-        """Mean cost and score of a controller in a task."""
-        costs = self.cells[self.names[controller], self.tasks[task].name].costs
-        score = mean_score({task: costs}, self.rule_costs, self.draws, controller)
-        return {
-            "cost": mean_cost(costs, self.draws, task, controller),
-            "score": score,
-        }
+    def gap(self, task: str, by_task: ByTask) -> float | None:
+        """Median over controllers of the cost on the ship by that on the model, less 1.
 
-    def ranking(self, by_task: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Return the totals of the controllers on the ship, the best first.
-
-        Those that could run all tasks come first, and of them those within all limits;
-        they are ordered by the geometric mean of their mean costs, as by their scores.
-        `elsewhere` has the totals of the other sets of episodes.
+        None of a task without a model. Both signs count as differences.
         """
-        ranked = []
-        for controller, name in enumerate(self.names):
-            totals = {}
-            for on in SETS:
-                if any(task.on == on for task in self.tasks):
-                    totals[on] = self._total(controller, on, by_task)
-            on_ship = totals.pop("ship", None) or self._total(
-                controller, "ship", by_task
-            )
-            ranked.append({"name": name, **on_ship, "elsewhere": totals})
-        return sorted(ranked, key=_sort_key)
+        sets = by_task[task]
+        ratios = [
+            cell["cost"]["value"] / sets["model"][name]["cost"]["value"] - 1.0
+            for name, cell in sets["ship"].items()
+            if "model" in sets
+        ]
+        return float(np.median(ratios)) if ratios else None
 
-    def _total(
-        self, controller: int, on: str, by_task: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        """Return the totals of a controller in all tasks of a set of episodes."""
-        name = self.names[controller]
-        costs = {}
-        cells = []
-        for number, task in enumerate(self.tasks):
-            if task.on == on and name in by_task[task.name]:
-                costs[number] = self.cells[name, task.name].costs
-                cells.append(by_task[task.name][name])
+    def rankings(self, by_task: ByTask) -> dict[str, list[dict[str, Any]]]:
+        """Return the totals of the controllers by part of the suite, the best first.
 
+        Those that could run all tasks come first, and of them those within all limits
+        on the ship; they are ordered by the geometric mean of their mean costs. A part
+        of which not all tasks were run has no scores.
+        """
+        rankings: dict[str, list[dict[str, Any]]] = {}
+        for part in dict.fromkeys(task.part for task in self.tasks):
+            totals = [self._total(name, part, by_task) for name in self.names]
+            rankings[part] = sorted(totals, key=_sort_key)
+        return rankings
+
+    def _total(self, name: str, part: str, by_task: ByTask) -> dict[str, Any]:
+        """Return the totals of a controller in the tasks of a part."""
+        costs = self.costs(name, "ship", part)
+        cells = [by_task[task]["ship"][name] for task in costs]
         means = [one.mean() for one in costs.values()]
-        mean = geometric_mean(means) if means else np.nan
-        return {
-            "score": mean_score(costs, self.rule_costs, self.draws, controller),
-            "improvement": improvement(costs, self.rule_costs, self.draws, controller),
-            "mean_cost": finite(float(mean)),
-            "tasks": len(cells),
+        total = {
+            "name": name,
+            "tasks": len(costs),
+            "of": sum(task.part == part for task in self.suite.tasks),
+            "mean_cost": finite(float(geometric_mean(means))) if means else None,
             "lost": sum(cell["lost"] for cell in cells),
             "failed": sum(cell["failed"] for cell in cells),
-            "exceeding": sum(bool(cell["exceeded"]) for cell in cells),
+            "exceeding": [
+                task for task in costs if by_task[task]["ship"][name]["exceeded"]
+            ],
         }
+        if total["tasks"] < total["of"]:
+            return {**total, "scores": {}}
+        scores = {}
+        for on in SETS:
+            mine, rules = self.costs(name, on, part), self.costs("", on, part)
+            if mine:
+                scores[on] = mean_score(mine, rules, self.draws)
+        better = improvement(costs, self.costs("", "ship", part), self.draws)
+        return {**total, "scores": scores, "improvement": better}
 
 
-def _metrics(episodes: pd.DataFrame) -> dict[tuple[str, str], dict[str, Any]]:
+def _metrics(episodes: pd.DataFrame) -> dict[tuple[str, ...], dict[str, Any]]:
     """Mean, median and 95th percentile of each figure that an episode has.
 
-    By task and controller, and by figure.
+    By task, set and controller, and by figure.
     """
     figures = episodes.columns.difference(KEYS, sort=False)
-    groups = episodes.groupby(["task", "controller"])[list(figures)]
+    groups = episodes.groupby(["task", "set", "controller"])[list(figures)]
     statistics = {
         "mean": groups.mean(),
         "median": groups.median(),
@@ -178,5 +189,5 @@ def _metrics(episodes: pd.DataFrame) -> dict[tuple[str, str], dict[str, Any]]:
 def _sort_key(total: Mapping[str, Any]) -> tuple[float, ...]:
     """Return what controllers are sorted by: tasks, limits, cost."""
     cost = total["mean_cost"]
-    is_beyond = total["exceeding"] > 0
+    is_beyond = bool(total["exceeding"])
     return (-total["tasks"], is_beyond, np.inf if cost is None else cost)

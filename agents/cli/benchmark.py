@@ -19,13 +19,15 @@ from agents.cli.command import (
 if TYPE_CHECKING:
     from agents.benchmarking.results import BenchmarkResult
 
+#: What is compared where nothing is named.
+BASELINES = "pid,lq,ilos,wheel-over,preview-lq"
 Controllers = Annotated[
-    str | None,
+    str,
     Option(
         help=(
             "What is compared, separated by commas: classical controllers (pid, lq,"
             " mpc, ...), tuned-pid, the shipped agent (ppo), files of agents,"
-            " module:function, name=...; default: all classical ones."
+            " module:function, name=..."
         )
     ),
 ]
@@ -38,20 +40,21 @@ Workers = Annotated[
 ]
 Episodes = Annotated[
     int,
-    Option(min=1, max=100, help="Number of episodes of each task, for a quick look."),
+    Option(min=1, max=100, help="Number of episodes of each set, for a quick look."),
+]
+Seed = Annotated[int, Option(min=0, help="Which episodes are judged: others for each.")]
+Runs = Annotated[
+    int, Option(min=1, help="How often an entry that searches or learns is made.")
 ]
 Resume = Annotated[
     bool, Option("--resume", help="Continue in a folder with results or parts of them.")
 ]
-Page = Annotated[
-    bool,
-    Option("--page/--no-page", help="Write index.html; later with --resume."),
-]
+Page = Annotated[bool, Option("--page/--no-page", help="Write index.html.")]
 
 
 def benchmark_command(
     out: Out,
-    controllers: Controllers = None,
+    controllers: Controllers = BASELINES,
     suite: Suite = "shipgym-v1",
     tasks: Tasks = None,
     workers: Workers = None,
@@ -59,16 +62,18 @@ def benchmark_command(
     address: Address = None,
     resume: Resume = False,
     episodes: Episodes = 100,
-    page: Page = False,
+    seed: Seed = 0,
+    runs: Runs = 1,
+    page: Page = True,
     allow_code: AllowCode = None,
 ) -> None:
     """Rank controllers on the tasks of a suite. All run the same episodes."""
     from agents.benchmarking.entries import read_entries
+    from agents.benchmarking.page import write_page
     from agents.benchmarking.run import benchmark
     from agents.cli.terminal import progress_bars, warn
-    from agents.controllers.registry import CLASSICAL
 
-    entries = read_entries(CLASSICAL if controllers is None else controllers)
+    entries = read_entries(controllers)
     for entry in entries:
         if entry.is_code:
             warn(
@@ -88,9 +93,12 @@ def benchmark_command(
                 address=address,
                 resume=resume,
                 episodes=episodes,
+                seed=seed,
+                runs=runs,
                 allow_code=allow_code or (),
             )
-        _write_page(result, out, page)
+        if page:
+            write_page(result, out / "index.html")
     except KeyboardInterrupt:
         fail(
             f"interrupted; what was done is kept in {out}: continue with --resume",
@@ -99,35 +107,18 @@ def benchmark_command(
     _print_result(result, out)
 
 
-def _write_page(result: BenchmarkResult, out: Path, page: bool) -> None:
-    """Write the page, or remove that of other results in the folder."""
-    path = out / "index.html"
-    path.unlink(missing_ok=True)
-    if not page:
-        return
-
-    from agents.benchmarking.page import write_page
-    from agents.cli.terminal import warn
-    from shipgym.errors import InputError
-
-    try:
-        write_page(result, path)
-    except InputError as error:  # the results are there even without plotly
-        warn(f"there is no {path.name}: {error}")
-
-
 def _print_result(result: BenchmarkResult, out: Path) -> None:
     """Print the ranking, or all of the summary."""
-    from agents.cli.benchmark_tables import costs_table, ranking_table
+    from agents.cli.benchmark_tables import costs_table, ranking_tables
     from agents.cli.terminal import answer, console, say, warn
 
     answer(result.summary)
-    console.print(ranking_table(result))
-    console.print()
-    console.print(costs_table(result))
-    say(f"\nwritten: {out}")
+    for table in (*ranking_tables(result), costs_table(result)):
+        console.print(table)
+        console.print()
+    say(f"written: {out}")
     for failure in result.failures:
         warn(failure)
-    count = result.summary["seeds"]["count"]
+    count = result.summary["options"]["episodes"]
     if count < 100:
         warn(f"{count} of 100 episodes: for a quick look, not for a ranking")

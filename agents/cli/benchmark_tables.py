@@ -10,50 +10,46 @@ from agents.cli.tables import between, number, plain_table
 from shipgym.pages.numbers import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from rich.table import Table
 
     from agents.benchmarking.results import BenchmarkResult
 
 
-def ranking_table(result: BenchmarkResult) -> Table:
-    """Return a table of the controllers, the best first."""
+def ranking_tables(result: BenchmarkResult) -> Iterator[Table]:
+    """Yield a table of the controllers for each part of the suite, the best first."""
     summary = result.summary
-    tasks = counted(len(result.tasks), "task")
-    episodes = counted(summary["seeds"]["count"], "episode")
-    rule = summary["rule"]["controller"]
-    table = plain_table(
-        f"{summary['suite']['name']}: {tasks} of {episodes}, best first\n"
-        f"score: cost of {rule} over this one, geometric mean over tasks",
-        "controller",
-        ">score",
-        ">95 %",
-        ">tasks",
-        ">runs",
-        ">lost",
-        ">failed",
-        ">beyond\nlimits",
-    )
-    for ranked in summary["ranking"]:
-        name = ranked["name"]
-        failed = ranked["failed"]
-        table.add_row(
-            name,
-            *_interval(ranked["score"], 3),
-            str(ranked["tasks"]),
-            str(summary["controllers"][name]["runs"]),
-            str(ranked["lost"]),
-            Text(str(failed), "bold red") if failed else "0",
-            str(ranked["exceeding"]),
+    episodes = counted(summary["options"]["episodes"], "episode")
+    for part, totals in summary["ranking"].items():
+        table = plain_table(
+            f"{summary['suite']['name']}, {part}: {episodes} of each task, best first\n"
+            "score: cost of the rule over this one, geometric mean over tasks",
+            "controller",
+            ">score",
+            ">95 %",
+            ">tasks",
+            ">lost",
+            ">failed",
+            "beyond limits",
         )
-    return table
+        for one in totals:
+            failed = one["failed"]
+            table.add_row(
+                one["name"],
+                *_interval(one["scores"].get("ship"), 3),
+                f"{one['tasks']} of {one['of']}",
+                str(one["lost"]),
+                Text(str(failed), "bold red") if failed else "0",
+                ", ".join(one["exceeding"]),
+            )
+        yield table
 
 
 def costs_table(result: BenchmarkResult) -> Table:
     """Return a table of mean costs, below each task a row for each controller."""
     table = plain_table(
-        "Mean cost of an episode, 95 % interval; the lowest first",
+        "Mean cost of an episode on the ship, 95 % interval; the lowest first",
         "task",
         ">cost",
         ">95 %",
@@ -72,9 +68,13 @@ def costs_table(result: BenchmarkResult) -> Table:
                 *_interval(cell["score"], 3),
                 str(cell["lost"] + cell["failed"]),
             )
+        for name in result.summary["controllers"].keys() - cells.keys():
+            table.add_row(f"  {name}", "lost")
     return table
 
 
-def _interval(of: Mapping[str, Any], decimals: int) -> tuple[str, str]:
+def _interval(of: Mapping[str, Any] | None, decimals: int) -> tuple[str, str]:
     """Return a value and its interval."""
+    if of is None:
+        return "", ""
     return number(of["value"], decimals), between((of["low"], of["high"]), decimals)

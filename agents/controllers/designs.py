@@ -97,35 +97,30 @@ def _designed(kind: Any, ship: _Ship, dt: float, settings: str) -> Controller:
     return made
 
 
-def tuned(kind: str, task: BenchmarkTask, suite: str) -> Controller:
+def tuned(kind: str, task: BenchmarkTask, suite: str, run: int = 0) -> Controller:
     """Design a classical controller with the settings found for a task of a suite.
 
-    `kind`: of `registry.CLASSICAL`; "best" is that which cost least, "base" likewise
-    without `NO_BASES`. Raises InputError if there are no such settings.
+    `kind`: of `registry.CLASSICAL`, or "base": that which cost least without
+    `NO_BASES`; `run`: which of the searches. Raises InputError if there are no such
+    settings.
     """
-    found = load_tuned(suite).get(task.name, {})
-    if kind == "best":
-        kind = _cheapest(found, kind)
-    elif kind == "base":
-        bases = {name: found[name] for name in found if name not in NO_BASES}
-        kind = _cheapest(bases, kind)
+    if kind == "base":
+        found = load_tuned(suite).get(task.name, {})
+        bases = [name for name in found if name not in NO_BASES]
+        kind = min(bases, key=lambda one: found[one][0]["cost"], default=kind)
+    return design(kind, task, tuned_runs(kind, task, suite)[run]["settings"])
 
-    if not found:
-        raise InputError(
-            f"controller: expected a task of suite '{suite}' with tuned controllers,"
-            f" got '{task.name}'"
-        )
+
+def tuned_runs(kind: str, task: BenchmarkTask, suite: str) -> list[dict[str, Any]]:
+    """What the searches of a controller found for a task of a suite, as `tuned`."""
+    found = load_tuned(suite).get(task.name, {})
     if kind not in found:
         raise InputError(
             f"controller: expected one that was tuned for task '{task.name}' of suite"
-            f" '{suite}', {quoted(found)}, got '{kind}'"
+            f" '{suite}', one of {quoted(found)}, got '{kind}'"
         )
-    return design(kind, task, found[kind]["settings"])
-
-
-def _cheapest(found: Mapping[str, Any], default: str) -> str:
-    """Kind of controller that cost least."""
-    return min(found, key=lambda kind: float(found[kind]["cost"]), default=default)
+    runs: list[dict[str, Any]] = found[kind]
+    return runs
 
 
 def no_path(kind: str, task: BenchmarkTask) -> InputError:

@@ -227,20 +227,18 @@ class Evaluation(NamedTuple):
 
 
 def evaluate(
-    policy: Policy, task: BenchmarkTask, seeds: ArrayLike | None = None
+    policy: Policy, task: BenchmarkTask, seeds: ArrayLike, on: str = "ship"
 ) -> Evaluation:
-    """Sail the episodes of a task, all at once, whatever the policy does.
+    """Sail episodes of a task, all at once, whatever the policy does.
 
     See `rollout`, tolerant. `policy`: anything with `predict`; it is given the
-    observations of all ships together; `task`: of a suite; `seeds`: by default those
-    that are scored, shape (n,).
+    observations of all ships together; `task`: of a suite; `seeds`: of shape (n,);
+    `on`: which of its sets the episodes are of.
     """
-    if seeds is None:
-        seeds = task.seeds
     numbers = np.asarray(seeds, dtype=np.int64)
     run = rollout(
         policy,
-        task.engine(len(numbers)),
+        task.engine(len(numbers), on=on),
         numbers,
         record=recorded_for_metrics(task.task),
         tolerant=True,

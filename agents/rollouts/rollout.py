@@ -208,6 +208,9 @@ class _Helmsman:
             missing = sailing & ~np.isfinite(given).all(axis=1)
             values = np.where((sailing & ~missing)[:, None], given, values)
             fault = fault or _no_number(given, missing, sailing)
+            beyond = self.tolerant and np.abs(values).max(initial=0.0) > 1.0 + 1e-6
+            if beyond and not fault:
+                fault = "expected numbers in [-1, 1], got others, which are limited"
 
         if fault and not self.tolerant:
             raise InputError(f"{type(self.policy).__name__}.predict: {where}: {fault}")

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from agents.suites.environments import SHORT_NAMES
-from shipgym import InputError, ShipModel, SteeringGear, Weather, load_model
+from shipgym import InputError, ShipModel, SteeringGear, load_model
 from shipgym.arrays import Integers
 from shipgym.checks import check_choice
 from shipgym.envs.registration import env_id
+from shipgym.models.catalogue import grey_box
 
 if TYPE_CHECKING:  # whoever shares work out does without
     from shipgym.envs.engine import Engine
@@ -24,9 +25,9 @@ if TYPE_CHECKING:  # whoever shares work out does without
 #: Seeds of the episodes that are scored; training and tuning use smaller ones.
 FIRST_SEED = 1_000_000
 N_EPISODES = 100
-#: Sets of episodes of a task with a true ship, and what their names end in.
-SETS: Mapping[str, str] = {"ship": "", "model": "-on-model", "far": "-far"}
-OPTION_FIELDS = ("options", "far")
+#: Sets of episodes: on the ship, ranked; on the ship in other episodes; on the model
+#: that controllers are made for; on the ship far from what they were made for.
+SETS = ("ship", "fresh", "model", "far")
 
 
 class Scenario(NamedTuple):
@@ -59,12 +60,16 @@ class BenchmarkTask:
         Keywords of the environment, `sea` among them.
     true_ship : str
         Model of the ship that is steered, if not `model`; controllers do not know it.
+    judge : mapping
+        What else differs on the ship: keywords of the environment; `gear`, fields of
+        the steering gear; `terms`, accelerations that are added, by equation and
+        formula (`shipgym.ships.terms.read_terms`).
     far : mapping
-        Keywords that differ in the episodes far from the design, and `gear`.
-    on : str
-        Which of `SETS` the episodes are of.
-    design_name : str
-        Name of the task that controllers are made for, if another.
+        The same in the episodes far from the design.
+    part : str
+        Tasks of one part are ranked together.
+    rule : str
+        Entry whose cost scores are relative to.
     suite : str
         `Suite.source` of its suite.
     limits : mapping of str to float
@@ -77,9 +82,10 @@ class BenchmarkTask:
     why: str = ""
     options: Mapping[str, Any] = field(default_factory=dict)
     true_ship: str = ""
+    judge: Mapping[str, Any] = field(default_factory=dict)
     far: Mapping[str, Any] = field(default_factory=dict)
-    on: str = "ship"
-    design_name: str = ""
+    part: str = "steering"
+    rule: str = "preview-lq"
     suite: str = ""
     limits: Mapping[str, float] = field(default_factory=dict)
 
@@ -94,7 +100,7 @@ class BenchmarkTask:
         Raises InputError, also for an unknown model, ship or option.
         """
         designed = self.design.observed()
-        steered = self.evaluation.observed()
+        steered = self.scenario("ship").observed()
         for on_model, on_ship in zip(designed, steered, strict=True):
             same_name = on_model.name == on_ship.name
             same_scale = on_model.scale == on_ship.scale
@@ -125,21 +131,27 @@ class BenchmarkTask:
         """Scenario that controllers are made for."""
         return self._scenario(self.ship, self.options)
 
-    @cached_property
-    def evaluation(self) -> Scenario:
-        """Scenario that controllers are evaluated in."""
-        if not self.true_ship and not self.far:
+    @property
+    def sets(self) -> tuple[str, ...]:
+        """Its sets of episodes, of `SETS`."""
+        judged = bool(self.true_ship or self.judge)
+        kept = {"model": judged, "far": bool(self.far)}
+        return tuple(one for one in SETS if kept.get(one, True))
+
+    def scenario(self, on: str) -> Scenario:
+        """Scenario of a set of episodes."""
+        if on == "model":
             return self.design
-        options = {**self.options, **self.far}
-        changes = options.pop("gear", {})
-        scenario = self._scenario(self.true_ship or self.ship, options)
+        changes = {**self.judge, **(self.far if on == "far" else {})}
+        gear = changes.pop("gear", {})
+        terms = changes.pop("terms", {})
+        given = load_model(self.true_ship) if self.true_ship else self.ship
+        ship = with_terms(given, terms)
+        steering = {**asdict(ship.steering), **gear}
+        ship = replace(ship, steering=SteeringGear.from_mapping(steering, "gear"))
+        return self._scenario(ship, {**self.options, **changes})
 
-        gear = {**asdict(scenario.ship.steering), **changes}
-        steering = SteeringGear.from_mapping(gear, "far.gear")
-        ship = replace(scenario.ship, steering=steering)
-        return scenario._replace(ship=ship)
-
-    def _scenario(self, model: str | ShipModel, options: Mapping[str, Any]) -> Scenario:
+    def _scenario(self, model: ShipModel, options: Mapping[str, Any]) -> Scenario:
         from shipgym.envs.environment import read_options
 
         task = SHORT_NAMES.get(self.environment, self.environment)
@@ -148,14 +160,7 @@ class BenchmarkTask:
     @cached_property
     def design_task(self) -> Self:
         """The task as controllers are given it: without the ship behind the model."""
-        return replace(
-            self,
-            name=self.design_name or self.name,
-            true_ship="",
-            far={},
-            on="ship",
-            design_name="",
-        )
+        return replace(self, true_ship="", judge={}, far={})
 
     @cached_property
     def ship(self) -> ShipModel:
@@ -170,15 +175,19 @@ class BenchmarkTask:
     @property
     def seeds(self) -> Integers:
         """Seeds of the episodes that are scored, shape (100,)."""
-        return FIRST_SEED + np.arange(N_EPISODES)
+        return judging_seeds("ship", N_EPISODES)
 
     def engine(
-        self, num_envs: int, model: ShipModel | None = None, threads: int = 1
+        self,
+        num_envs: int,
+        model: ShipModel | None = None,
+        threads: int = 1,
+        on: str = "model",
     ) -> Engine:
-        """Return many ships at once in its episodes, by default its own ship."""
+        """Return many ships at once in a set of its episodes, by default the model."""
         from shipgym.envs.engine import Engine
 
-        ship, task, randomisation = self.evaluation
+        ship, task, randomisation = self.scenario(on)
         return Engine(
             ship if model is None else model,
             num_envs,
@@ -190,7 +199,7 @@ class BenchmarkTask:
     @property
     def files(self) -> list[Path]:
         """Files of the user's own that it names: tasks, models, rewards, sensors."""
-        options = {**self.options, **self.far}
+        options = {**self.options, **self.judge, **self.far}
         named = [self.environment, self.model, self.true_ship, *options.values()]
         suffixes = (".py", ".json")
         files = []
@@ -203,29 +212,31 @@ class BenchmarkTask:
         return files
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `from_dict` reads, ready for JSON."""
-        content = {}
-        for part in fields(self):
-            content[part.name] = getattr(self, part.name)
-        for name in OPTION_FIELDS:
-            options = dict(content[name])
-            sea = options.get("sea")
-            if isinstance(sea, Weather):
-                options["sea"] = sea.to_dict()
-            content[name] = options
-        return content
+        """Return its fields, ready for JSON."""
+        return {part.name: getattr(self, part.name) for part in fields(self)}
 
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        """Read what `to_dict` returned."""
-        values = dict(content)
-        for name in OPTION_FIELDS:
-            options = dict(values[name])
-            sea = options.get("sea")
-            if isinstance(sea, Mapping):
-                options["sea"] = Weather.from_dict(sea, "sea")
-            values[name] = options
-        return cls(**values)
+
+def judging_seeds(on: str, number: int, seed: int = 0) -> Integers:
+    """Seeds of so many episodes of a set that are scored; others for each `seed`."""
+    first = 2 * FIRST_SEED if on == "fresh" else FIRST_SEED
+    return first + N_EPISODES * seed + np.arange(number)
+
+
+def with_terms(ship: ShipModel, terms: Mapping[str, Mapping[str, float]]) -> ShipModel:
+    """A ship with accelerations added, in units of her length and service speed."""
+    if not terms:
+        return ship
+    box = grey_box(ship, {name: ", ".join(found) for name, found in terms.items()})
+    values = [value for found in terms.values() for value in found.values()]
+    return replace(
+        ship,
+        structure=box.name,
+        dynamics=box,
+        coefficients=dict(zip(box.coefficient_names, values, strict=True)),
+        covariance=None,
+        envelope=None,
+        provenance=None,
+    )
 
 
 @dataclass(frozen=True)
@@ -234,27 +245,22 @@ class ModelTask(BenchmarkTask):
 
     Attributes
     ----------
-    scenario : Scenario
+    given : Scenario
         Model, task and domain randomisation.
     """
 
-    scenario: Any = None
+    given: Any = None
 
     @classmethod
     def of(cls, name: str, environment: str, scenario: Scenario) -> Self:
         """Make the task of a scenario."""
-        return cls(name, environment, model=scenario.ship.name, scenario=scenario)
+        return cls(name, environment, model=scenario.ship.name, given=scenario)
 
     @property
     def design(self) -> Scenario:
         """Scenario that controllers are made for."""
-        found: Scenario = self.scenario
+        found: Scenario = self.given
         return found
-
-    @property
-    def evaluation(self) -> Scenario:
-        """Scenario that controllers are evaluated in, the same."""
-        return self.design
 
     @property
     def design_task(self) -> Self:

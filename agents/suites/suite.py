@@ -1,9 +1,7 @@
 """Suites: named tasks with their ship, their sea and the seeds of their episodes.
 
 A suite is a TOML file, as docs/benchmark.md describes it: a shipped one in this folder,
-or a user's own. A task with a true ship has three sets of episodes (`SETS`):
-controllers are made for its model and evaluated on the ship, on the model, and on the
-ship far from what they were made for.
+or a user's own.
 """
 
 import hashlib
@@ -16,15 +14,15 @@ from typing import Any
 from agents.suites.benchmark_task import (
     FIRST_SEED,
     N_EPISODES,
-    SETS,
     BenchmarkTask,
 )
 from agents.suites.environments import read_environment
 from agents.suites.limits import read_limits
-from shipgym import InputError, Weather
+from shipgym import InputError
 from shipgym.checks import (
     check_choice,
     check_keys,
+    check_number,
     check_table,
     check_text,
     data_only,
@@ -36,7 +34,6 @@ __all__ = [
     "DEFAULT_SUITE",
     "FIRST_SEED",
     "N_EPISODES",
-    "SETS",
     "BenchmarkTask",
     "Suite",
     "find_task",
@@ -55,7 +52,10 @@ FIELDS = (
     "sea",
     "options",
     "ship",
+    "judge",
     "far",
+    "part",
+    "rule",
     "limits",
 )
 
@@ -68,6 +68,7 @@ class Suite:
     tasks: tuple[BenchmarkTask, ...]  # in the order of the file
     source: str = ""  # name of a shipped suite, or the absolute path of a user's own
     sha256: str = ""  # of the file
+    budget: float = 1e12  # most ship steps that making a run of an entry may take
 
     def task(self, name: str) -> BenchmarkTask:
         """Return a task by name; raises InputError for an unknown one."""
@@ -76,10 +77,7 @@ class Suite:
         return known[name]
 
     def select(self, names: str | Sequence[str] | None) -> tuple[BenchmarkTask, ...]:
-        """Return tasks by name, each once; None for all of them.
-
-        The name of a task with a true ship stands for all its sets of episodes.
-        """
+        """Return tasks by name, each once; None for all of them."""
         if names is None:
             return self.tasks
         if isinstance(names, str):
@@ -87,17 +85,7 @@ class Suite:
             names = [name.strip() for name in parts]
         if not names:
             raise InputError("tasks: expected at least one, got none")
-
-        selected: dict[str, BenchmarkTask] = {}
-        for name in names:
-            for task in self._sets(name):
-                selected[task.name] = task
-        return tuple(selected.values())
-
-    def _sets(self, name: str) -> list[BenchmarkTask]:
-        """Return the sets of episodes of a task, or the one of this name."""
-        sets = [task for task in self.tasks if task.design_name == name]
-        return sets or [self.task(name)]
+        return tuple(self.task(name) for name in dict.fromkeys(names))
 
 
 def load_suite(
@@ -130,7 +118,7 @@ def load_suite(
         raise InputError(f"{where}: expected UTF-8, got other bytes") from None
     found = parse_suite(text, where, path.parent, allow_code, source=str(path))
     for task in found.tasks:
-        with placed(f"{where}: tasks.{task.design_name}"):
+        with placed(f"{where}: tasks.{task.name}"):
             task.check_ship()
     return found
 
@@ -139,7 +127,8 @@ def load_suite(
 def _shipped(name: str) -> Suite:
     check_choice(name, (DEFAULT_SUITE,), "suite", " or the path of a TOML file")
     text = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
-    return parse_suite(text, f"suite '{name}'", FOLDER, source=name)
+    rule = "shipgym.examples.encounter_rule:factory"
+    return parse_suite(text, f"suite '{name}'", FOLDER, [rule], source=name)
 
 
 def find_task(
@@ -149,11 +138,7 @@ def find_task(
 
     Raises InputError for an unknown name, with the nearest, or as `load_suite`.
     """
-    known = {}
-    found = load_suite(suite, allow_code)
-    for task in found.tasks:
-        if task.on == "ship":
-            known[task.name] = task
+    known = {task.name: task for task in load_suite(suite, allow_code).tasks}
     check_choice(name, known, "task")
     return known[name].design_task
 
@@ -199,21 +184,19 @@ def parse_suite(
     `Suite.source`; for `allow_code` see `load_suite`. Raises InputError naming the
     field at fault.
     """
-    reader = _Reader(folder, allow_code)
     content = parse_toml(text, f"{where}:")
-    check_keys(content, ("name", "tasks"), where)
+    check_keys(content, ("name", "budget", "tasks"), where)
+    budget = check_number(content.get("budget", 1e12), f"{where}: budget", above=0.0)
     name = check_text(content.get("name"), f"{where}: name")
-    tasks_field = f"{where}: tasks"
-    tables = check_table(content.get("tasks"), tasks_field)
-
-    tasks: list[BenchmarkTask] = []
-    for task_name, table in tables.items():
-        field = f"{tasks_field}.{task_name}"
-        task = reader.read(task_name, table, field)
-        tasks += _sets_of(replace(task, suite=source))
-
+    reader = _Reader(folder, allow_code)
+    tasks = []
+    for task_name, value in check_table(
+        content.get("tasks"), f"{where}: tasks"
+    ).items():
+        task = reader.read(task_name, value, f"{where}: tasks.{task_name}")
+        tasks.append(replace(task, suite=source))
     sha256 = hashlib.sha256(text.encode()).hexdigest()
-    return Suite(name, tuple(tasks), source, sha256)
+    return Suite(name, tuple(tasks), source, sha256, budget)
 
 
 @dataclass(frozen=True)
@@ -224,113 +207,57 @@ class _Reader:
     allow_code: Collection[str] = ()
 
     def read(self, name: str, value: Any, where: str) -> BenchmarkTask:
-        """Return a task, that of the ship if it has one."""
+        """Return a task."""
         table = check_table(value, where, FIELDS)
-        if table.get("far") and "ship" not in table:
-            raise InputError(
-                f"{where}.far: expected `ship` too, the one behind the model, got none"
-            )
         field = f"{where}.environment"
         text = check_text(table.get("environment"), field)
-        self.check_code(text, table, where)
-
+        self.check_code(text, field)
+        self.check_code(str(table.get("rule", "")), f"{where}.rule")
+        given: dict[str, Any] = self.resolved(table, where)
+        options = dict(check_table(given.pop("options", {}), f"{where}.options"))
+        if "sea" in given:
+            options["sea"] = given.pop("sea")
         environment = read_environment(text, self.folder, field)
-        options = {**environment.options, **self.own_options(table, where)}
-        far = self.options(table.get("far", {}), f"{where}.far")
-
+        options = {**environment.options, **options}
         default_model = options.pop("model", None)
-        named_model = table.get("model", default_model)
-        model = check_text(named_model, f"{where}.model")
-        ship = ""
-        if "ship" in table:
-            ship = check_text(table["ship"], f"{where}.ship")
+        given["model"] = given.get("model", default_model)
+        for named in {"model", "ship", "why", "part", "rule"} & given.keys():
+            check_text(given[named], f"{where}.{named}")
+        for named in ("judge", "far"):
+            check_table(given.get(named, {}), f"{where}.{named}")
+        limits = read_limits(given.pop("limits", {}), f"{where}.limits")
+        given["true_ship"] = given.pop("ship", "")
+        given |= {"environment": environment.name, "options": options}
         with placed(where):
-            return BenchmarkTask(
-                name=name,
-                environment=environment.name,
-                model=self.absolute(model),
-                why=str(table.get("why", "")),
-                options=options,
-                true_ship=self.absolute(ship),
-                far=far,
-                design_name=name,
-                limits=read_limits(table.get("limits", {}), f"{where}.limits"),
-            )
+            return BenchmarkTask(name=name, limits=limits, **given)
 
-    def own_options(self, table: Mapping[str, Any], where: str) -> dict[str, Any]:
-        """Keywords of an environment that a task's table gives, its sea among them."""
-        options = self.options(table.get("options", {}), f"{where}.options")
-        if "sea" in table:
-            sea = {"sea": table["sea"]}
-            options |= self.options(sea, where)
-        return options
-
-    def check_code(
-        self, environment: str, table: Mapping[str, Any], where: str
-    ) -> None:
+    def check_code(self, text: str, where: str) -> None:
         """Refuse code that the user has not named too."""
-        is_code = ":" in environment or environment.endswith(".py")
-        if is_code and not self.allows(environment):
+        is_code = ":" in text or text.endswith(".py")
+        if is_code and not self.allows(text):
             raise InputError(
-                f"{where}.environment: expected no code that you have not named"
-                f" yourself, got '{environment}'; if you trust it: --allow-code"
-                f" {environment}"
+                f"{where}: expected no code that you have not named yourself, got"
+                f" '{text}'; if you trust it: --allow-code {text}"
             )
-        data_only(self.without_allowed(table), where)
 
     def allows(self, text: str) -> bool:
         """Tell whether the user has named this code too."""
         paths = [Path(code).resolve() for code in self.allow_code]
         return text in self.allow_code or (self.folder / text).resolve() in paths
 
-    def without_allowed(self, value: Any) -> Any:
-        """Copy a value of TOML without the code that is allowed."""
+    def resolved(self, value: Any, where: str) -> Any:
+        """Copy a value of TOML; paths of files become absolute, code is refused."""
         if isinstance(value, Mapping):
-            kept = {}
-            for key, part in value.items():
-                kept[key] = self.without_allowed(part)
-            return kept
+            parts = {}
+            for name, part in value.items():
+                if not self.allows(str(part)):
+                    data_only({name: part} if isinstance(part, str) else {}, where)
+                parts[name] = self.resolved(part, f"{where}.{name}")
+            return parts
         if isinstance(value, list):
-            return [self.without_allowed(part) for part in value]
-        if isinstance(value, str) and self.allows(value):
-            return None
-        return value
-
-    def options(self, value: Any, where: str) -> dict[str, Any]:
-        """Keywords of an environment: a sea may be a table, paths become absolute."""
-        options = {}
-        for name, option in check_table(value, where).items():
-            options[name] = self.absolute(option)
-
-        sea = options.get("sea")
-        if isinstance(sea, Mapping):
-            field = f"{where}.sea"
-            with placed(field):
-                options["sea"] = Weather.from_dict(sea, field)
-        return options
-
-    def absolute(self, value: Any) -> Any:
-        """Absolute path of a Python or JSON file; anything else as it is."""
-        if isinstance(value, list):
-            return [self.absolute(part) for part in value]
+            return [self.resolved(part, where) for part in value]
         if isinstance(value, str) and value.endswith((".py", ".json")):
-            path = self.folder / value
-            return str(path.resolve())
+            if not self.allows(value):
+                data_only(value, where)
+            return str((self.folder / value).resolve())
         return value
-
-
-def _sets_of(task: BenchmarkTask) -> list[BenchmarkTask]:
-    """Return a task once for each set of episodes that it has."""
-    on_ship = replace(task, far={})
-    if not task.true_ship:
-        return [on_ship]
-    on_model = replace(
-        task,
-        name=task.name + SETS["model"],
-        on="model",
-        true_ship="",
-        far={},
-    )
-    if not task.far:
-        return [on_ship, on_model]
-    return [on_ship, on_model, replace(task, name=task.name + SETS["far"], on="far")]

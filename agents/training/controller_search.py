@@ -110,6 +110,7 @@ def tune_controller(
     task: BenchmarkTask,
     budget: SearchBudget | None = None,
     *,
+    seed: int = 0,
     on_progress: OnProgress | None = None,
 ) -> FoundSettings:
     """Search the settings of a controller on the model of a task.
@@ -124,6 +125,8 @@ def tune_controller(
     task : BenchmarkTask
         Its design task is what is sailed.
     budget : SearchBudget, optional
+    seed : int
+        Of the search.
     on_progress : callable, optional
         Called after each generation.
     """
@@ -137,6 +140,7 @@ def tune_controller(
         episodes.costs,
         space,
         budget,
+        seed=seed,
         renew=episodes.renew,
         on_progress=on_progress,
     )

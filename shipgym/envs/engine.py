@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import partial
-from typing import Any, NoReturn
+from typing import Any, ClassVar, NoReturn
 
 import gymnasium
 import numpy as np
@@ -61,7 +61,14 @@ class Engine(Lanes):
     cut_off : float
         Control intervals after which an episode is truncated, if earlier than by the
         task.
+
+    Attributes
+    ----------
+    ship_steps : int
+        Control intervals of ships that all engines of this process have taken.
     """
+
+    ship_steps: ClassVar[int] = 0
 
     def __init__(
         self,
@@ -194,6 +201,7 @@ class Engine(Lanes):
         earlier ones may be kept. Returns the number of episodes that ended. Raises
         InputError if a command is not finite; nothing is changed then.
         """
+        Engine.ship_steps += self.num_envs
         before = self.outputs
         if anew:
             self.renew_outputs()

@@ -18,7 +18,7 @@ ship = "mariner"
 options = { episode_steps = 60, n_legs = 2 }
 far = { gear = { time_constant = 8.0 } }
 """
-TURNS = ("turns", "turns-on-model", "turns-far")
+SETS = ["ship", "fresh", "model", "far"]  # of the task "turns"
 
 
 def write_suite(folder, text=TEXT, **kept):

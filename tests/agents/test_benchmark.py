@@ -3,7 +3,6 @@
 import json
 import shutil
 import sys
-from functools import partial
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -13,15 +12,14 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from agents import LQ, PID, WheelOver, benchmark, load_results
+from agents import LQ, PID, benchmark, load_results
 from agents.benchmarking.entries import Entry, read_entries
 from agents.cli import app
 from agents.controllers.designs import design
 from agents.suites.suite import parse_suite
 from shipgym import load_model
 from shipgym.errors import InputError
-from tests.agents.policies import random_policy
-from tests.agents.small_suite import TEXT, TURNS, write_suite
+from tests.agents.small_suite import SETS, TEXT, write_suite
 
 N, FIRST = 4, 1_000_000
 MARINER = load_model("mariner")
@@ -70,51 +68,54 @@ class Broken:
 def test_results_are_those_of_any_worker_and_read_back_as_they_were_written(
     folder, suite
 ):
-    again = load_results(folder)
+    result = load_results(folder)
     fresh = benchmark("pid,lq", suite, "calm", workers=2, episodes=N)
-    assert again.ranking == fresh.ranking
-    pd.testing.assert_frame_equal(again.episodes, fresh.episodes, check_exact=True)
-    costs = again.figures("lq", "calm")
-    assert costs.shape == (1, N)
-    cell = again.summary["tasks"]["calm"]["lq"]
-    assert cell["cost"]["low"] < cell["cost"]["value"] == costs.mean()
-    rule = again.summary["rule"]
-    assert rule["controller"] == "preview-lq"  # the suite has no tuned settings
-    assert cell["score"]["value"] == pytest.approx(rule["costs"]["calm"] / costs.mean())
-
-
-def test_the_files_name_what_they_were_made_with(folder):
+    pd.testing.assert_frame_equal(result.episodes, fresh.episodes)
+    assert result.ranking == ["lq", "pid"]
     summary = json.loads((folder / "results.json").read_text())
-    versions = {"shipgym", "numpy", "numba", "python", "processor"}
-    assert versions <= set(summary["versions"])
-    suite = summary["suite"]
-    about = (suite["name"], suite["file"], suite["complete"])
-    assert about == ("small-v1", "small.toml", False)
-    assert summary["seeds"] == {"first": FIRST, "count": N}
-    assert summary["controllers"]["lq"]["source"] == "lq"
-    hashes = (suite["sha256"], summary["episodes"]["sha256"])
-    assert [len(one) for one in hashes] == [64] * 2
-
+    assert {"shipgym", "numpy", "processor"} <= set(summary["versions"])
+    about = [summary["suite"][name] for name in ("name", "file", "n_tasks")]
+    assert about == ["small-v1", "small.toml", 2]
+    assert summary["suite"]["tasks"]["calm"]["rule"] == "preview-lq"
     table = pd.read_parquet(folder / "episodes.parquet")
-    assert list(table)[:4] == ["controller", "task", "run", "seed"]
+    assert list(table)[:5] == ["controller", "task", "set", "run", "seed"]
     assert table["cross_track_rmse_m"].isna().all()  # course keeping has no path
-    assert table["seed"].tolist() == 2 * [FIRST + k for k in range(N)]
+    seeds = [FIRST + k for k in range(N)] + [2 * FIRST + k for k in range(N)]
+    assert table["seed"].tolist() == 2 * seeds
+    frame = result.to_frame()
+    assert frame["set"].tolist() == ["ship", "ship", "fresh", "fresh"]
+    cost = result.figures("lq", "calm").mean()
+    assert frame.query("controller == 'lq'")["cost"].iloc[0] == pytest.approx(cost)
 
 
 def test_what_was_run_is_kept_and_not_run_again(copy, suite):
     with pytest.raises(InputError, match=r"already contains results.*--resume"):
         benchmark("pid,lq", suite, "calm", copy, episodes=N)
-    (part,) = [one for one in (copy / "parts").iterdir() if '"pid"' in one.read_text()]
-    kept = part.read_text()
-    part.write_text(kept.replace('\\"failure\\": \\"\\"', '\\"failure\\": \\"kept\\"'))
+    for other in ({"episodes": 2}, {"seed": 1}, {"runs": 2}):
+        ((name, value),) = other.items()
+        said = f"{name}: expected that of its results, .*, got {value}"
+        again = {"episodes": N, "resume": True, **other}
+        with pytest.raises(InputError, match=said):
+            benchmark("pid,lq", suite, "calm", copy, **again)
+    (part,) = [
+        one for one in (copy / "parts").iterdir() if '\\"pid\\"' in one.read_text()
+    ]
+    was, now = (f'\\"failures\\": {{{how}}}' for how in ("", '\\"ship\\": \\"kept\\"'))
+    kept = part.read_text().replace(was, now)
+    assert kept != part.read_text()
+    part.write_text(kept)
     result = benchmark("pid,lq,ilos", suite, "calm", copy, resume=True, episodes=N)
-    assert load_results(copy).summary["controllers"].keys() == {"pid", "lq", "ilos"}
-    assert result.summary["tasks"]["calm"]["pid"]["failure"] == "kept"
+    assert result.failures == ["pid in calm, ship: kept (0 episodes failed)"]
     # ilos leads the LQ where there is no path
-    for name in ("ilos", "lq"):
-        np.testing.assert_array_equal(
-            result.figures(name, "calm"), load_results(copy).figures("lq", "calm")
-        )
+    costs = load_results(copy).figures("lq", "calm")
+    np.testing.assert_array_equal(result.figures("ilos", "calm"), costs)
+
+
+def test_each_seed_has_other_episodes(suite):
+    first, other = (
+        benchmark("lq", suite, "calm", episodes=2, seed=seed) for seed in (0, 1)
+    )
+    assert set(other.episodes["seed"]).isdisjoint(first.episodes["seed"])
 
 
 def test_a_controller_that_fails_or_cannot_run_a_task_is_named_and_comes_last(suite):
@@ -122,77 +123,85 @@ def test_a_controller_that_fails_or_cannot_run_a_task_is_named_and_comes_last(su
     given = {"other": other, "broken": Broken(), "pid": "pid"}
     result = benchmark(given, suite, "calm", episodes=N)
     assert result.ranking == ["pid", "broken", "other"]
-    assert result.summary["ranking"][1]["failed"] == N
-    cell = result.summary["tasks"]["calm"]["broken"]
-    assert "no finite number for 4 of 4 ships" in cell["failure"]
-    refused = result.summary["controllers"]["other"]["refused"]["calm"]
+    first, second, last = result.summary["ranking"]["steering"]
+    assert (first["scores"], first["tasks"], first["of"]) == ({}, 1, 2)
+    assert (second["failed"], last["tasks"]) == (N, 0)
+    refused, *failed = result.failures
+    assert "other could not run calm: " in refused
     assert "scale of 'yaw_rate'" in refused
-    assert result.failures == [
-        f"other could not run calm: {refused}",
-        f"broken failed in 4 episodes of calm: {cell['failure']}",
-    ]
+    assert "broken in calm, ship: step 0: expected numbers in [-1, 1]" in failed[0]
     assert result.figures("other", "calm").size == 0
 
 
-def test_the_ranking_is_of_the_ship_and_the_rest_stands_beside_it(suite, tmp_path):
+def test_the_ranking_is_of_the_ship_and_the_rest_stands_beside_it(tmp_path):
+    text = TEXT.replace('model = "mariner"', 'model = "mariner"\npart = "other"')
+    suite = write_suite(tmp_path, text)
     result = benchmark("wheel-over,lq", suite, "turns", tmp_path / "out", episodes=3)
-    assert result.tasks == TURNS
     assert result.summary == load_results(tmp_path / "out").summary
-    for ranked in result.summary["ranking"]:
-        assert ranked["tasks"] == 1
-        elsewhere = {on: total["tasks"] for on, total in ranked["elsewhere"].items()}
-        assert elsewhere == {"model": 1, "far": 1}
-    assert result.summary["suite"]["tasks"]["turns-far"]["ship"] == "mariner"
-    costs = [result.figures("wheel-over", task).mean() for task in TURNS]
-    assert len(set(costs)) == 3
+    assert list(result.summary["tasks"]["turns"]) == SETS
+    for ranked in result.summary["ranking"]["steering"]:
+        assert list(ranked["scores"]) == SETS
+    costs = [result.figures("wheel-over", "turns", on=on).mean() for on in SETS]
+    assert len(set(costs)) == 4
+    gaps = []
+    for name in ("wheel-over", "lq"):
+        ship, model = (result.figures(name, "turns", on=on) for on in SETS[::2])
+        gaps.append(ship.mean() / model.mean() - 1.0)
+    gap = result.summary["suite"]["tasks"]["turns"]["gap"]
+    assert gap == pytest.approx(np.mean(gaps))
 
 
 def test_scores_are_relative_to_the_rule_and_settings_are_those_that_were_tuned(
     tmp_path,
 ):
     tuned = {
-        "lq": {"settings": {"integral_lengths": 80.0}, "cost": 24.0},
-        "preview-lq": {"settings": {}, "cost": 25.0},
+        "lq": [
+            {"settings": {"integral_lengths": n}, "cost": 24.0} for n in (80.0, 60.0)
+        ],
+        "preview-lq": [{"settings": {}, "cost": 25.0, "ship_steps": 9}],
     }
-    suite = write_suite(tmp_path, tuned={"tasks": {"turns": tuned, "calm": tuned}})
-    names = "tuned-preview-lq,tuned-best,tuned-lq,tuned-mpc"
-    own = {"own": lambda task: design("lq", task, tuned["lq"]["settings"])}
-    result = benchmark(names, suite, "turns", episodes=3)
-    other = benchmark(own, suite, "turns", episodes=3).figures("own", "turns")
-    for name in ("tuned-best", "tuned-lq"):
-        np.testing.assert_array_equal(result.figures(name, "turns"), other)
-    refused = result.summary["controllers"]["tuned-mpc"]["refused"]["turns"]
-    assert "expected one that was tuned" in refused
-    assert result.summary["rule"]["controller"] == "tuned-preview-lq"
-    cells = result.summary["tasks"]["turns"]
-    assert cells["tuned-preview-lq"]["score"]["value"] == 1.0
-    rule, lq = (cells[name]["cost"]["value"] for name in list(cells)[::2])
-    assert cells["tuned-lq"]["score"]["value"] == pytest.approx(rule / lq)
-    assert result.ranking[-1] == "tuned-mpc"
+    suite = write_suite(
+        tmp_path,
+        "budget = 8"
+        + TEXT.replace('ship = "mariner"', 'ship = "mariner"\nrule = "tuned-lq"'),
+        tuned={"tasks": {"turns": tuned}},
+    )
+    own = {"own": lambda task, seed: design("lq", task, tuned["lq"][seed]["settings"])}
+    names = {name: name for name in ("tuned-lq", "tuned-mpc", "tuned-preview-lq")}
+    result = benchmark(names | own, suite, "turns", episodes=3, runs=2)
+    costs = result.figures("own", "turns")
+    assert costs.shape == (2, 3)
+    np.testing.assert_array_equal(result.figures("tuned-lq", "turns"), costs)
+    cells = result.cells("turns")
+    assert cells["tuned-lq"]["score"] == {"value": 1.0, "low": 1.0, "high": 1.0}
+    refused = {
+        name: about["refused"].get("turns", "")
+        for name, about in result.summary["controllers"].items()
+    }
+    assert "expected one that was tuned" in refused["tuned-mpc"]
+    assert "expected at most 8 ship steps" in refused["tuned-preview-lq"]
 
 
 def test_those_beyond_a_limit_come_after_those_within(tmp_path):
-    suite = write_suite(
-        tmp_path,
-        TEXT.replace("far = {", "limits = { rudder_travel_deg_min = 20.0 }\nfar = {"),
-    )
+    limits = "limits = { rudder_travel_deg_min = 20.0 }\nfar = {"
+    suite = write_suite(tmp_path, TEXT.replace("far = {", limits))
 
     def busy(task):
         lq = LQ.from_model(task.ship, dt=task.task.interval(task.ship))
         calls = iter(range(10_000))
-
-        class Busy:
-            def predict(self, seen, state=None, starts=None, deterministic=True):
-                actions, state = lq.predict(seen, state, starts, deterministic)
-                return actions + 0.3 * (-1.0) ** next(calls), state
-
-        return Busy()
+        bang = Mock(spec=["predict"])
+        bang.predict = lambda seen, state, *rest: (
+            lq.predict(seen)[0] + 0.9 * (-1.0) ** next(calls),
+            state,
+        )
+        return bang
 
     lazy = Mock(spec=["predict"])
     lazy.predict = lambda seen, *_: (np.zeros((len(seen), 1)), None)
     result = benchmark({"busy": busy, "lazy": lazy}, suite, "turns", episodes=2)
     assert result.ranking == ["lazy", "busy"]
-    assert result.summary["ranking"][1]["exceeding"] == 1
+    assert result.summary["ranking"]["steering"][1]["exceeding"] == ["turns"]
+    assert "expected numbers in [-1, 1], got others" in result.failures[0]
 
 
 # --- who takes part
@@ -202,15 +211,14 @@ def test_those_beyond_a_limit_come_after_those_within(tmp_path):
     ("given", "said"),
     [
         ("lqq", "got 'lqq'.*Did you mean 'lq'"),
-        ("best-known", "expected one of 'pid'.*got 'best-known'"),
         ("pid,pid", "got 'pid' twice"),
         ("x=nobody.json", "got 'nobody.json'"),
         ("model.zip", r"LearnedPolicy\.from_sb3\(agent\)\.save\('agent\.json'\)"),
-        ("no_such_module:make", "whose module 'no_such_module' is not found"),
+        ("no_such_module:make", "'no_such_module:make', whose module is not found"),
         ({"a": 3}, "'a': expected a controller.* got 3"),
         ({"a": [LQ.from_model(MARINER), 3]}, "'a': expected a controller.* got 3"),
         ([], "controllers: expected at least one, got none"),
-        ("=pid", r"expected a name before '=', got none"),
+        ("=pid", r"expected different names before '=', got ''"),
     ],
 )
 def test_wrong_controllers_are_refused(given, said):
@@ -219,60 +227,57 @@ def test_wrong_controllers_are_refused(given, said):
 
 
 def test_controllers_are_given_as_texts_functions_objects_and_by_name():
-    class Iterable(LQ):
-        def __iter__(self):
-            return iter(())
-
     def make(task):
         return pid
 
     pid, lazy = PID.from_model(MARINER), Broken()
     lazy.name = None
-    iterable = Iterable(**vars(LQ.from_model(MARINER)))
     pattern = "{task}-pid-*.json"  # its files are looked for when a task is run
     for given, expected in (
         (" pid , mine = lq ", [("pid", "pid"), ("mine", "lq")]),
         (pid, [("pid", pid)]),
-        (iterable, [("lq", iterable)]),
         (make, [("make", make)]),
         (Entry("x", "lq"), [("x", "lq")]),
         ([lazy, "pid"], [("Broken", lazy), ("pid", "pid")]),
         ({"both": [pid, make]}, [("both", [pid, make])]),
         (pattern, [("pid", pattern)]),
-        ("{task}.json", [("agent", "{task}.json")]),
     ):
         found = [(entry.name, entry.source) for entry in read_entries(given)]
         assert found == expected
     (both,) = read_entries({"both": [pid, make]})
-    assert both.policies(CALM) == [pid, pid]
+    assert both.made(CALM).policies == [pid, pid]
 
 
-def test_controllers_are_given_the_model_only():
-    task = SMALL.task("turns-far")
+def test_controllers_are_given_the_model_only_and_designs_on_the_ship_are_refused():
+    task = SMALL.task("turns")
     given = []
-    Entry("mine", lambda one: given.append(one) or LQ.from_model(one.ship)).policies(
-        task
-    )
+    mine = Entry("mine", lambda one: given.append(one) or LQ.from_model(one.ship))
+    mine.made(task)
     assert (given[0].name, given[0].true_ship, given[0].far) == ("turns", "", {})
-    assert given[0].evaluation.ship.name == "mariner-tls-svm"
+    assert given[0].scenario("ship").ship.name == "mariner-tls-svm"
 
-
-def test_a_design_on_the_ship_is_refused_wherever_it_is_hidden():
-    task = SMALL.task("turns-far")
-    ship = task.evaluation.ship
-
-    def with_parts(design_task, **parts):
+    def hidden(design_task):
         policy = LQ.from_model(design_task.ship)
-        for name, part in {"policy": policy, **parts}.items():
-            object.__setattr__(policy, name, part)  # its class is frozen
+        inner = LQ.from_model(load_model("mariner"))
+        object.__setattr__(policy, "fallback", inner)  # its class is frozen
         return policy
 
-    (policy,) = Entry("mine", partial(with_parts, base=Mock())).policies(task)
-    assert policy.policy is policy
-    hidden = partial(with_parts, fallback=LQ.from_model(ship))
-    for cheat in (lambda one: WheelOver.from_model(ship, task=one.task), hidden):
-        with pytest.raises(InputError, match="got one on the ship 'mariner'"):
-            Entry("cheat", cheat).policies(task)
+    with pytest.raises(InputError, match="got one on the ship 'mariner'"):
+        Entry("cheat", hidden).made(task)
+
+
+def test_a_run_that_sails_more_than_the_budget_is_refused():
+    def trained(task, seed):
+        task.engine(10).reset(np.arange(10))
+        engine = task.engine(10)
+        engine.reset(np.arange(10))
+        engine.step(np.zeros((10, 1)))
+        return LQ.from_model(task.ship)
+
+    made = Entry("mine", trained).made(CALM, runs=3, budget=10)
+    assert (len(made.policies), made.ship_steps) == (3, 10.0)
+    with pytest.raises(InputError, match=r"at most 9 ship steps .* got 10"):
+        Entry("mine", trained).made(CALM, budget=9)
 
 
 def test_training_runs_are_files_of_one_controller(suite, tmp_path):
@@ -282,8 +287,7 @@ def test_training_runs_are_files_of_one_controller(suite, tmp_path):
     pattern = f"mine={tmp_path}/{{task}}-pid-*.json"
     result = benchmark(pattern, suite, "calm", episodes=2)
     assert result.figures("mine", "calm").shape == (2, 2)
-    about = result.summary["controllers"]["mine"]
-    assert (about["runs"], len(about["files"])) == (2, 2)
+    assert len(result.summary["controllers"]["mine"]["files"]) == 2
 
 
 # --- tasks and suites of a user's own
@@ -346,7 +350,7 @@ def test_a_suite_of_ones_own_is_run_as_a_shipped_one(own):
     assert result.tasks == ("fairway", "narrow")
     assert (result.figures("helm", "fairway", "success") == 1.0).all()
     # the rule cannot steer this ship by her shaft too: there are no scores
-    assert result.summary["ranking"][0]["score"]["value"] is None
+    assert result.summary["ranking"]["steering"][0]["scores"]["ship"]["value"] is None
     about = result.summary["suite"]["tasks"]["narrow"]
     assert about["environment"] == str(own / "fairway.py")
     (refused, _) = result.summary["controllers"]["lq"]["refused"].values()
@@ -360,21 +364,10 @@ def test_a_suite_of_ones_own_is_run_as_a_shipped_one(own):
     ("name", "old", "new", "said"),
     [
         ("results.json", b'"versions"', b'"', "may be cut short"),
-        ("results.json", b'"format": 3', b'"format": 2', "expected format 3, .* got 2"),
+        ("results.json", b'"format": 4', b'"format": 2', "expected format 4, .* got 2"),
         ("results.json", b'"ranking"', b'"rankings"', "unknown key 'rankings'"),
-        (
-            "results.json",
-            b'"shipgym-benchmark"',
-            b'"model"',
-            "kind: expected 'shipgym-benchmark', got 'model'",
-        ),
-        ("results.json", b'"runs": 1', b'"runs": 2', "got other content"),
-        (
-            "episodes.parquet",
-            b"PAR1",
-            b"PAR2",
-            "expected the file that results.json was written with",
-        ),
+        ("results.json", b'"shipgym-benchmark"', b'"model"', "kind: expected"),
+        ("episodes.parquet", b"PAR1", b"PAR2", "expected a table of episodes"),
     ],
 )
 def test_broken_results_are_refused(copy, name, old, new, said):
@@ -392,16 +385,15 @@ def test_broken_results_are_refused(copy, name, old, new, said):
 def test_the_command_ranks_and_writes(suite, tmp_path):
     out = tmp_path / "r"
     words = ["--controllers", "pid", "--suite", suite, "--tasks", "calm"]
-    words += ["--episodes", 2, "--workers", 1, "--out", out, "--no-page"]
+    words += ["--episodes", 2, "--workers", 1, "--out", out]
     answer = shipgym(*words)
     assert answer.exit_code == 0, answer.stderr
-    assert answer.stdout.startswith("small-v1: 1 task of 2 episodes, best first")
-    assert f"written: {out}" in answer.stdout.replace("\n", "")
-    assert load_results(out).ranking == ["pid"]
-    (out / "index.html").touch()
+    assert answer.stdout.startswith("small-v1, steering: 2 episodes of each task")
+    assert "warning: 2 of 100 episodes: for a quick look" in answer.stderr
+    assert (out / "index.html").exists()
     again = shipgym(*words, "--resume", "--json")
-    assert json.loads(again.stdout)["ranking"][0]["name"] == "pid"
-    assert not (out / "index.html").exists()  # it would be of the results before
+    (ranked,) = json.loads(again.stdout)["ranking"]["steering"]
+    assert (ranked["name"], ranked["tasks"], ranked["of"]) == ("pid", 1, 2)
 
 
 def test_the_command_goes_on_where_it_was_interrupted(suite, tmp_path, monkeypatch):
@@ -416,21 +408,12 @@ def test_the_command_goes_on_where_it_was_interrupted(suite, tmp_path, monkeypat
         answer = shipgym(*words)
     assert answer.exit_code == 130
     assert "what was done is kept in r: continue with --resume" in answer.stderr
-    answer = shipgym(*words, "--resume")
-    assert answer.exit_code == 0
-    assert "warning: 2 of 100 episodes: for a quick look" in answer.stderr
+    assert shipgym(*words, "--resume").exit_code == 0
     assert set(load_results("r").ranking) == {"lq", "pid"}
 
 
 def test_bad_input_is_one_message_and_nothing_is_written(suite, tmp_path):
     out = tmp_path / "r"
-    cut, weightless, other = (
-        tmp_path / f"{name}.json" for name in ("cut", "weightless", "other")
-    )
-    random_policy(load_model("kvlcc2")).save(other)
-    weightless.write_bytes(other.read_bytes())
-    cut.write_bytes(other.read_bytes()[:300])
-    calm = ["--suite", suite, "--tasks", "calm"]
     for words, said in (
         (["--controllers", "pdi"], "Did you mean 'pid'"),
         (["--episodes", 101], "--episodes"),
@@ -438,12 +421,8 @@ def test_bad_input_is_one_message_and_nothing_is_written(suite, tmp_path):
         (["--suite", "shipgym-v2"], "Did you mean 'shipgym-v1'"),
         (["--suite", tmp_path / "none.toml"], "there is no such TOML file of a suite"),
         (["--suite", suite, "--tasks", "calm,"], "task: expected one of"),
-        ([*calm, "--controllers", f"pid,{cut}"], "may be cut short"),
-        ([*calm, "--controllers", f"pid,{weightless}"], "no such file"),
-        ([*calm, "--controllers", f"pid,{other}"], "fits none of the tasks"),
     ):
         answer = shipgym(*words, "--out", out)
         assert (answer.exit_code, answer.stdout) == (2, "")
         assert said in answer.stderr
-    assert "Missing option '--out'" in shipgym("--controllers", "pid").stderr
     assert not out.exists()

@@ -19,13 +19,13 @@ def values(found):
 def test_intervals_of_every_statistic_are_those_of_theory():
     """Half-widths of 1.96 standard errors."""
     costs = np.random.default_rng(3).normal(50.0, 10.0, (1, 1000))
-    draws = Draws(1, 1000, n_draws=1000)
+    draws = Draws(1000, n_draws=1000)
     sigma = 10.0 / np.sqrt(1000)
-    rule_costs = {0: np.full((1, 1000), 50.0)}
+    rule_costs = {"a": np.full((1, 1000), 50.0)}
     for found, error in (
-        (mean_cost(costs, draws, 0), sigma),
-        (mean_score({0: costs}, rule_costs, draws), sigma / 50.0),
-        (improvement({0: costs}, rule_costs, draws), 0.5 / np.sqrt(1000)),
+        (mean_cost({"a": costs}, draws), sigma),
+        (mean_score({"a": costs}, rule_costs, draws), sigma / 50.0),
+        (improvement({"a": costs}, rule_costs, draws), 0.5 / np.sqrt(1000)),
     ):
         assert found["low"] < found["value"] < found["high"]
         half = 0.5 * (found["high"] - found["low"])
@@ -35,17 +35,19 @@ def test_intervals_of_every_statistic_are_those_of_theory():
 def test_training_runs_that_differ_widen_the_interval():
     alike = np.tile(RANDOM.normal(50.0, 1.0, 100), (5, 1))
     apart = alike + np.array([[-20.0], [-10.0], [0.0], [10.0], [20.0]])
-    draws = Draws(1, 100)
-    narrow, wide = mean_cost(alike, draws, 0), mean_cost(apart, draws, 0)
+    draws = Draws(100)
+    narrow, wide = mean_cost({"a": alike}, draws), mean_cost({"a": apart}, draws)
     assert narrow["value"] == pytest.approx(wide["value"])
     assert wide["high"] - wide["low"] > 10.0 * (narrow["high"] - narrow["low"])
 
 
 def test_a_score_is_the_geometric_mean_over_the_tasks_that_the_rule_ran():
     levels = [1.0, 1.2, 1.4, 0.6, 0.8, 9.0, 0.01, 0.5]
-    costs = {task: np.full((1, 10), 30.0 / level) for task, level in enumerate(levels)}
-    rule_costs = {task: np.full((1, 10), 30.0) for task in range(7)}
-    draws = Draws(9, 10)
+    costs = {
+        f"{task}": np.full((1, 10), 30.0 / level) for task, level in enumerate(levels)
+    }
+    rule_costs = {f"{task}": np.full((1, 10), 30.0) for task in range(7)}
+    draws = Draws(10)
     expected = gmean(levels[:7])
     assert values(mean_score(costs, rule_costs, draws)) == pytest.approx([expected] * 3)
     assert values(mean_score({}, rule_costs, draws)) == [None, None, None]
@@ -54,15 +56,15 @@ def test_a_score_is_the_geometric_mean_over_the_tasks_that_the_rule_ran():
 def test_scores_are_paired_over_episodes():
     """Episodes differ tenfold, but the rule costs 5 % more in each of them."""
     costs = RANDOM.uniform(10.0, 100.0, (1, 100))
-    scored = mean_score({0: costs}, {0: 1.05 * costs}, Draws(1, 100))
+    scored = mean_score({"a": costs}, {"a": 1.05 * costs}, Draws(100))
     assert values(scored) == pytest.approx([1.05] * 3)
 
 
 def test_probability_of_improvement_is_paired_and_ties_count_half():
     def probability(costs, rule):
         costs, rule = np.array(costs), np.array([rule])
-        draws = Draws(1, costs.shape[1])
-        return improvement({0: costs}, {0: rule}, draws)["value"]
+        draws = Draws(costs.shape[1])
+        return improvement({"a": costs}, {"a": rule}, draws)["value"]
 
     one, other = [1.0, 2.0, 3.0, 4.0], [2.0, 2.0, 1.0, 9.0]
     assert probability([one], other) == (1.0 + 0.5 + 0.0 + 1.0) / 4.0

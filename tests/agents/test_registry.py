@@ -89,18 +89,16 @@ def test_a_controller_of_ones_own_is_one_file(mine, tmp_path, monkeypatch):
     results = [
         benchmark(
             "my-pd,lq,file=pd.json",
-            tasks=["sharp-turns-on-model"],
+            tasks=["sharp-turns"],
             episodes=2,
             workers=workers,
         )
         for workers in (1, 2)
     ]
     for result in results:
-        costs = result.figures("my-pd", "sharp-turns-on-model")
-        np.testing.assert_array_equal(
-            costs, results[0].figures("my-pd", "sharp-turns-on-model")
-        )
-        assert (costs > result.figures("lq", "sharp-turns-on-model")).all()
+        costs = result.figures("my-pd", "sharp-turns")
+        np.testing.assert_array_equal(costs, results[0].figures("my-pd", "sharp-turns"))
+        assert (costs > result.figures("lq", "sharp-turns")).all()
 
 
 def test_what_is_no_controller_is_refused():

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import shipgym
+from agents.controllers.interface import model_hash
+from agents.suites.benchmark_task import SETS, judging_seeds, with_terms
 from agents.suites.environments import read_environment
 from agents.suites.suite import (
     BenchmarkTask,
@@ -17,7 +19,7 @@ from agents.suites.suite import (
     parse_suite,
     suite_file,
 )
-from shipgym import InputError, Weather
+from shipgym import InputError, load_model
 from tests.agents.small_suite import TEXT as SMALL
 from tests.agents.small_suite import write_suite
 
@@ -59,7 +61,6 @@ def test_a_suite_is_read_task_by_task():
     assert (drift.env_id, drift.ship.name) == ("shipgym/PathFollowing-v0", "kvlcc2")
     assert (calm.why, calm.arguments) == ("the easiest", {"noise": 1.0})
     assert calm.task.weather.calm
-    assert isinstance(drift.options["sea"], Weather)
     assert drift.task.weather.current.speed == 0.5
     assert rough.task.weather.name == "rough"
     assert suite.task("drift") is drift
@@ -88,13 +89,13 @@ def test_a_suite_is_read_task_by_task():
             'reward = "my_reward.py"',
             "tasks.calm.options.reward: expected data, got 'my_reward.py'",
         ),
-        ("speed = 0.5", "speed = -0.5", "tasks.drift.sea"),
+        ("speed = 0.5", "speed = -0.5", "tasks.drift: current speed"),
         (
             'sea = "rough"',
             'sea = "wild"',
             "tasks.rough: sea: expected one of .* got 'wild'",
         ),
-        ('why = "the easiest"', "far = { noise = 2.0 }", "tasks.calm.far: expected"),
+        ('why = "the easiest"', 'rule = "a:b"', "tasks.calm.rule: expected no code"),
         (
             'why = "the easiest"',
             "limits = { heel = 3.0 }",
@@ -127,40 +128,50 @@ def test_shipped_suites_are_known_by_name():
 
 def test_tasks_are_selected_by_name_each_once():
     assert SHIPPED.select(None) == SHIPPED.tasks
-    sets = [f"strong-current{end}" for end in ("", "-on-model", "-far")]
-    for names, selected in (
-        ("strong-current", sets),
-        (["strong-current-far"], sets[2:]),
-        ("strong-current-far, strong-current", [sets[2], *sets[:2]]),
-    ):
-        assert [task.name for task in SHIPPED.select(names)] == selected
+    for names in ("sharp-turns, seaway", ["sharp-turns", "seaway", "sharp-turns"]):
+        found = [task.name for task in SHIPPED.select(names)]
+        assert found == ["sharp-turns", "seaway"]
     with pytest.raises(InputError, match="tasks: expected at least one, got none"):
         SHIPPED.select([])
     with pytest.raises(InputError, match=r"task: expected one of .* got ''"):
         SHIPPED.select("roll-limit,")
 
 
-def test_a_task_with_a_ship_is_evaluated_on_her_on_the_model_and_far_from_the_design():
-    assert {task.on for task in SHIPPED.tasks} == {"ship", "model", "far"}
-    for name in ("failing-gear", "strong-current"):
-        ship, model, far = SHIPPED.select(name)
-        assert ship.design_task == far.design_task == model.design_task
-        assert ship.ship.name == model.evaluation.ship.name == ship.model
-        assert ship.evaluation.ship.name == far.evaluation.ship.name == ship.true_ship
-    steering = SHIPPED.task("failing-gear-far").engine(1).model.steering
-    assert steering.time_constant == 8.0
-    assert SHIPPED.task("failing-gear").engine(1).model.steering.time_constant == 1.0
-    far = SHIPPED.task("strong-current-far").evaluation.task
+def test_a_task_is_judged_on_a_ship_that_its_model_s_family_does_not_hold():
+    for task in SHIPPED.tasks:
+        learning = task.part == "learning"
+        assert task.sets == (SETS[:2] if learning else SETS)
+        assert task.design.ship.name == task.model
+        if not learning:
+            ship = task.scenario("ship").ship
+            assert ship.dynamics != task.ship.dynamics
+            assert model_hash(ship) != model_hash(load_model(task.true_ship))
+    seaway = SHIPPED.task("seaway")
+    assert seaway.scenario("far").ship.steering.time_constant == 3.0
+    far = SHIPPED.task("strong-current").scenario("far").task
     assert far.weather.current.speed == 4.0
 
 
+def test_terms_are_accelerations_in_units_of_length_and_speed():
+    mariner = load_model("mariner")
+    ship = with_terms(mariner, {"v": {"|v| v": -2.0}, "r": {"|delta| delta": 0.5}})
+    x = np.zeros(len(ship.state_names))
+    x[ship.state_names.index("u")] = U = mariner.particulars["speed"]
+    x[ship.state_names.index("v")] = 0.1 * U
+    x[ship.state_names.index("delta")] = 0.2
+    L, order = mariner.particulars.length, np.array([0.2])
+    added = ship.derivatives(x, order) - mariner.derivatives(x, order)
+    assert added[ship.state_names.index("v")] == pytest.approx(-0.02 * U**2 / L)
+    assert added[ship.state_names.index("r")] == pytest.approx(0.02 * U**2 / L**2)
+
+
 def test_the_design_task_does_not_name_the_ship():
-    design = SHIPPED.task("two-zigzags-far").design_task
-    assert (design.name, design.true_ship, design.far) == ("two-zigzags", "", {})
-    assert design.evaluation.ship.name == "container-two-zigzags"
-    assert find_task("two-zigzags") == design
-    with pytest.raises(InputError, match=r"task: .* got 'two-zigzags-far'"):
-        find_task("two-zigzags-far")
+    task = SHIPPED.task("sharp-turns")
+    design = task.design_task
+    assert (design.true_ship, design.judge, design.far) == ("", {}, {})
+    assert design.scenario("ship").ship.name == task.model
+    assert find_task("sharp-turns") == design
+    assert not set(judging_seeds("fresh", 100)) & set(judging_seeds("ship", 100))
 
 
 def test_a_ship_of_other_particulars_than_the_model_is_refused(tmp_path):
@@ -197,7 +208,7 @@ def test_a_suite_names_the_file_of_a_task_that_its_user_names_too(tmp_path):
     assert (suite.name, suite.source, task.suite) == ("own", str(path), str(path))
     assert task.environment == str(tmp_path / "fairway.py")
     assert task.files == [tmp_path / "fairway.py"]
-    assert BenchmarkTask.from_dict(task.to_dict()) == task
+    assert BenchmarkTask(**task.to_dict()) == task
     env = gymnasium.make(task.env_id, model=task.model, **task.arguments)
     assert env.unwrapped.task == task.task
     assert task.task.speed_limit == 0.5
@@ -249,5 +260,5 @@ def test_tuned_settings_are_tables_by_task(tmp_path):
     ):
         with pytest.raises(InputError, match=said):
             load_tuned(str(write_suite(tmp_path, tuned=content)))
-    tasks = {"calm": {"lq": {"cost": 1.0}}}
+    tasks = {"calm": {"lq": [{"cost": 1.0}]}}
     assert load_tuned(str(write_suite(tmp_path, tuned={"tasks": tasks}))) == tasks
