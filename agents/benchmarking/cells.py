@@ -106,9 +106,10 @@ def run_cell(entry: Entry, task: BenchmarkTask, options: Options) -> Cell:
         figures[on] = {}
         for name in sailed[0].figures:
             figures[on][name] = np.stack([one.figures[name] for one in sailed])
-        failed = [one.run.failure for one in sailed if one.run.failure]
-        failures |= dict.fromkeys([on], failed[0]) if failed else {}
-        seconds += [one.run.seconds_per_action for one in sailed]
+        for one in sailed:
+            seconds.append(one.run.seconds_per_action)
+            if one.run.failure:
+                failures.setdefault(on, one.run.failure)
     return Cell(
         figures=figures,
         failures=failures,

@@ -338,10 +338,13 @@ def source_files(text: str, task: BenchmarkTask) -> list[Path]:
         return _module_files(text)
     if text == SHIPPED:
         agent = PRETRAINED / f"{task.environment}-{text}.json"
-        return [agent] if agent.is_file() else []
+        if agent.is_file():
+            return [agent]
+        return []
     if text in known_names():
         return []
-    return _matching_files(text.replace("{task}", task.name))
+    pattern = text.replace("{task}", task.name)
+    return _matching_files(pattern)
 
 
 def _module_files(text: str) -> list[Path]:
@@ -349,8 +352,10 @@ def _module_files(text: str) -> list[Path]:
     module, _, _ = text.rpartition(":")
     with working_folder(), suppress(ImportError):
         spec = find_spec(module)
-        if spec is not None and spec.has_location:
-            return [Path(str(spec.origin))]
+        if spec is None or not spec.has_location:
+            return []
+        origin = str(spec.origin)
+        return [Path(origin)]
     return []
 
 

@@ -4,10 +4,12 @@ docs/benchmark.md describes `results.json`; `episodes.parquet` has one row for e
 controller, task, set of episodes, run and seed.
 """
 
+import json
 import platform
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Self
@@ -16,8 +18,8 @@ import numpy as np
 import pandas as pd
 
 from agents.benchmarking.cells import Cells, Options
-from agents.benchmarking.entries import Entry
-from agents.benchmarking.summary import KEYS, Summary
+from agents.benchmarking.entries import Entry, file_hash
+from agents.benchmarking.summary import Summary
 from agents.controllers.interface import model_hash
 from agents.output import check_writable, present
 from agents.suites.suite import BenchmarkTask, Suite
@@ -40,6 +42,7 @@ FIELDS = (
     "controllers",
     "tasks",
     "ranking",
+    "sha256",
 )
 PACKAGES = ("shipgym", "numpy", "numba", "scipy", "control")
 REMEDY = "run `shipgym benchmark` again"
@@ -143,7 +146,8 @@ class BenchmarkResult:
         make_folder(target)
         with atomic_path(target / EPISODES) as draft:
             self.episodes.to_parquet(draft, engine="pyarrow", index=False)
-        write_json(self.summary, target / RESULTS)
+        content = {**self.summary, "sha256": _hash(self.summary, target / EPISODES)}
+        write_json(content, target / RESULTS)
         return self
 
 
@@ -302,15 +306,17 @@ def load_results(path: str | Path) -> BenchmarkResult:
     check_format(summary, FORMAT, str(where))
     check_fields(summary, FIELDS, str(where), REMEDY)
     table = where.with_name(EPISODES)
-    _pyarrow()
-    try:
-        episodes = pd.read_parquet(table, engine="pyarrow")
-        missing = [name for name in (*KEYS, "cost") if name not in episodes]
-        if missing:
-            raise ValueError(f"no column '{missing[0]}'")
-    except (OSError, ValueError) as error:
+    content = {name: summary[name] for name in FIELDS if name != "sha256"}
+    if summary["sha256"] != _hash(content, table):
         raise InputError(
-            f"{table}: expected a table of episodes, got one that cannot be read"
-            f" ({error}); {REMEDY}"
-        ) from None
-    return BenchmarkResult(dict(summary), episodes)
+            f"{where}: expected it and {EPISODES} as the benchmark wrote them, got"
+            f" other content; {REMEDY}"
+        )
+    _pyarrow()
+    return BenchmarkResult(content, pd.read_parquet(table, engine="pyarrow"))
+
+
+def _hash(summary: Mapping[str, Any], table: Path) -> str:
+    """SHA-256 of a summary and of the table of episodes beside it."""
+    text = json.dumps(summary, sort_keys=True) + file_hash(table)
+    return sha256(text.encode()).hexdigest()

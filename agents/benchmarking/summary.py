@@ -130,9 +130,12 @@ class Summary:
         of which not all tasks were run has no scores.
         """
         rankings: dict[str, list[dict[str, Any]]] = {}
-        for part in dict.fromkeys(task.part for task in self.tasks):
-            totals = [self._total(name, part, by_task) for name in self.names]
-            rankings[part] = sorted(totals, key=_sort_key)
+        for task in self.tasks:
+            if task.part not in rankings:
+                totals = []
+                for name in self.names:
+                    totals.append(self._total(name, task.part, by_task))
+                rankings[task.part] = sorted(totals, key=_sort_key)
         return rankings
 
     def _total(self, name: str, part: str, by_task: ByTask) -> dict[str, Any]:

@@ -64,7 +64,8 @@ def metrics(run: Rollout) -> dict[str, Floats]:
     violated = {}
     for name in run.task.constraints:
         broken = during(run, CONSTRAINT + name) > 0.0
-        violated[f"violated_{name}"] = ratio(total(broken), run.steps)
+        intervals = total(broken)
+        violated[f"violated_{name}"] = ratio(intervals, run.steps)
     return {
         **costs(run),
         **steering(run),

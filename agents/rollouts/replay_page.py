@@ -196,7 +196,8 @@ def _lines(
     lines = [(quantity.factor * values, "solid")]
     if quantity.order in series:
         # without a jump from what follows it
-        ordered = values + wrapped(series[quantity.order] - values)
+        ahead = wrapped(series[quantity.order] - values)
+        ordered = values + ahead
         lines.append((quantity.factor * ordered, "dot"))
     return lines
 

@@ -116,9 +116,11 @@ def load_suite(
         text = content.decode()
     except UnicodeDecodeError:
         raise InputError(f"{where}: expected UTF-8, got other bytes") from None
-    found = parse_suite(text, where, path.parent, allow_code, source=str(path))
+    source = str(path)
+    found = parse_suite(text, where, path.parent, allow_code, source)
     for task in found.tasks:
-        with placed(f"{where}: tasks.{task.name}"):
+        field = f"{where}: tasks.{task.name}"
+        with placed(field):
             task.check_ship()
     return found
 

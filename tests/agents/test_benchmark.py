@@ -367,7 +367,8 @@ def test_a_suite_of_ones_own_is_run_as_a_shipped_one(own):
         ("results.json", b'"format": 4', b'"format": 2', "expected format 4, .* got 2"),
         ("results.json", b'"ranking"', b'"rankings"', "unknown key 'rankings'"),
         ("results.json", b'"shipgym-benchmark"', b'"model"', "kind: expected"),
-        ("episodes.parquet", b"PAR1", b"PAR2", "expected a table of episodes"),
+        ("results.json", b'"runs": 1', b'"runs": 2', "got other content"),
+        ("episodes.parquet", b"PAR1", b"PAR2", "expected it and episodes"),
     ],
 )
 def test_broken_results_are_refused(copy, name, old, new, said):
