@@ -56,7 +56,7 @@ fuzz: $(VENV)/dev-installed
 evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/reproduce.py all --markdown docs/reproduction.md || test $$? = 1  # 1: aims missed, as the page says
 	test ! -d $(DATA) || $(BIN)/python scripts/predict_real_ships.py --data $(DATA)
-	$(BIN)/shipgym benchmark --controllers lq,tuned-ilos,wheel-over,tuned-wheel-over,mpc,ppo --out build/suite
+	$(BIN)/shipgym benchmark --controllers tuned-preview-lq,tuned-wheel-over,preview-lq,wheel-over,ilos,lq,pid --runs 5 --out build/suite
 	$(BIN)/python scripts/certainty.py --out build/certainty.jsonl
 	$(BIN)/python scripts/autopilots.py --rows build/autopilots.jsonl
 	$(BIN)/python scripts/bridge_logs.py

@@ -329,6 +329,7 @@ def bridge_noise(multiple: float) -> dict[str, float]:
     noise = {}
     for name, channel in channels.items():
         noise[name] = multiple * SEA_TRIAL[channel].noise
+    noise["ground"] = multiple * 0.05  # m/s, of a satellite receiver
     return noise
 
 

@@ -1,4 +1,7 @@
-"""Instruments of a bridge: motion in waves, noise, and a filter against the waves.
+"""Instruments of a bridge: motion in waves, noise, a satellite receiver, a filter.
+
+The filter is against the waves. The receiver's velocity over ground lags by
+`RECEIVER_LAG` where instruments are noisy.
 
 The notch filter (s^2 + 2 a w s + w^2) / (s^2 + 2 b w s + w^2) around the frequency of
 encounter: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control,
@@ -19,6 +22,7 @@ from shipgym.sea.open_sea import Sea
 INSTRUMENTS_STREAM = np.uint64(0xE7037ED1A0B428DB)
 #: Damping ratios a and b of the notch's numerator and denominator.
 DEEP, WIDE = 0.1, 0.7
+RECEIVER_LAG = 3.0  # s, time constant of the velocity over ground
 
 HAS_NOISE, HAS_FILTER = True, True  # known when compiled
 
@@ -30,6 +34,7 @@ class Settings(NamedTuple):
     yaw_rate: float = 0.0  # rad/s
     speed: float = 0.0  # m/s, of surge and sway
     position: float = 0.0  # m
+    ground: float = 0.0  # m/s, of the velocity over ground, north and east
 
 
 class Notch(NamedTuple):
@@ -50,6 +55,8 @@ class Noise(NamedTuple):
     v: float
     x: float
     y: float
+    north: float
+    east: float
 
 
 class Memory(NamedTuple):
@@ -61,6 +68,10 @@ class Memory(NamedTuple):
     u: float
     v: float
     r: float
+    north: float  # m/s, velocity over ground after the lag of the receiver
+    east: float
+    ground_north: float  # the same with noise, less the true one
+    ground_east: float
     heading: Notch
     rate: Notch
 
@@ -74,13 +85,19 @@ def measure(
     settings: Settings,
     random: Random,
 ) -> Memory:
-    """Add first-order motion and noise; subtract the filter's estimate of the waves.
+    """Add first-order motion, noise and lag; subtract the filter's estimate of waves.
 
     See `shipgym.instruments.perfect` for the arguments.
     """
-    noise = Noise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    noise = Noise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    north, east = over_ground(motion, sea)
+    lagged_north, lagged_east = north, east
     if HAS_NOISE:
         noise = drawn_noise(interval, settings, random)
+        share = interval.dt / (interval.dt + RECEIVER_LAG)
+        share = pick(interval.steps == 0.0, 1.0, share)
+        lagged_north = memory.north + share * (north - memory.north)
+        lagged_east = memory.east + share * (east - memory.east)
     psi = sea.psi_wave + noise.psi
     r = sea.r_wave + noise.r
     heading = memory.heading
@@ -100,6 +117,10 @@ def measure(
         u=noise.u,
         v=noise.v,
         r=r,
+        north=lagged_north,
+        east=lagged_east,
+        ground_north=lagged_north + noise.north - north,
+        ground_east=lagged_east + noise.east - east,
         heading=heading,
         rate=rate,
     )
@@ -116,7 +137,16 @@ def drawn_noise(interval: Interval, settings: Settings, random: Random) -> Noise
         v=settings.speed * normal(word, DRAW[3]),
         x=settings.position * normal(word, DRAW[4]),
         y=settings.position * normal(word, DRAW[5]),
+        north=settings.ground * normal(word, DRAW[6]),
+        east=settings.ground * normal(word, DRAW[7]),
     )
+
+
+def over_ground(motion: Motion, sea: Sea) -> tuple[float, float]:
+    """Velocity over ground to the north and to the east, m/s."""
+    ahead, aside = ground_velocity(motion, sea.current_north, sea.current_east)
+    sine, cosine = sin_cos(motion.psi)
+    return cosine * ahead - sine * aside, sine * ahead + cosine * aside
 
 
 def notched(signal: float, turn: float, first: bool, memory: Notch) -> Notch:
@@ -148,6 +178,10 @@ def notched(signal: float, turn: float, first: bool, memory: Notch) -> Notch:
 def readings(motion: Motion, sea: Sea, memory: Memory) -> Readings:
     """Readings: the ship's motion plus the additions of the instruments."""
     ahead, aside = ground_velocity(motion, sea.current_north, sea.current_east)
+    if HAS_NOISE:
+        sine, cosine = sin_cos(motion.psi)
+        ahead += cosine * memory.ground_north + sine * memory.ground_east
+        aside += cosine * memory.ground_east - sine * memory.ground_north
     return Readings(
         motion.x + memory.x,
         motion.y + memory.y,
