@@ -129,8 +129,7 @@ def load_suite(
 def _shipped(name: str) -> Suite:
     check_choice(name, (DEFAULT_SUITE,), "suite", " or the path of a TOML file")
     text = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
-    rule = "shipgym.examples.encounter_rule:factory"
-    return parse_suite(text, f"suite '{name}'", FOLDER, [rule], source=name)
+    return parse_suite(text, f"suite '{name}'", FOLDER, source=name)
 
 
 def find_task(
