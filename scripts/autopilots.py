@@ -19,12 +19,11 @@ import argparse
 import itertools
 import sys
 import warnings
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+import pandas as pd
 from foreign_ships import KeptRows, Row, identified, sea_trials, ship_names, ship_of
 
 from agents import rollout, sail
@@ -100,57 +99,21 @@ def steered(design: Controller, ship: ShipModel) -> Row:
     return {"lost": lost, "cost": float(np.mean(costs))}
 
 
-def counted(rows: Sequence[Mapping[str, Any]]) -> Counter[str]:
-    """Designs by whether they steer and whether they are given."""
-    counts: Counter[str] = Counter()
+def fates(rows: Sequence[Row]) -> pd.DataFrame:
+    """A row for each design: what it was given for, whether it steers, and its cost."""
+    found = []
     for row in rows:
-        counts["ships"] += 1
-        given = 0
         for kind, fate in row.get("steered", {}).items():
-            does = "lost" if fate["lost"] else "steer"
-            is_refused = kind in row["refused"]
-            counts[f"{does} {'refused' if is_refused else 'given'}"] += 1
-            given += not is_refused
-        counts["ships with one"] += given > 0
-    return counts
-
-
-def table_of_given(rows: Sequence[Row]) -> str:
-    """Designs given and refused by structure, in Markdown."""
-    lines = [
-        "| structure | ships with an autopilot | given: steer, lost |"
-        " refused: would steer, would not |",
-        "| --- | --- | --- | --- |",
-    ]
-    groups = {f"`{row['structure']}`": [] for row in rows} | {"**all**": list(rows)}
-    for row in rows:
-        groups[f"`{row['structure']}`"].append(row)
-    for name, group in groups.items():
-        n = counted(group)
-        lines.append(
-            f"| {name} | {n['ships with one']} of {n['ships']} |"
-            f" {n['steer given']}, {n['lost given']} |"
-            f" {n['steer refused']}, {n['lost refused']} |"
-        )
-    return "\n".join(lines)
-
-
-def table_of_paths(rows: Sequence[Row]) -> str:
-    """Cost and ships lost on paths, by ship, in Markdown."""
-    led = [
-        (row, {k: one for k, one in row.get("steered", {}).items() if "cost" in one})
-        for row in rows
-    ]
-    guides = list(dict.fromkeys(kind for _, costs in led for kind in costs))
-    lines = ["| ship, structure | " + " | ".join(guides) + " |"]
-    lines.append("| --- |" + " --- |" * len(guides))
-    for row, costs in led:
-        cells = [
-            f"{costs[one]['cost']:.1f}, {costs[one]['lost']}" if one in costs else "-"
-            for one in guides
-        ]
-        lines.append(f"| {row['ship']}, {row['structure']} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+            found.append(
+                {
+                    **{name: row[name] for name in ("ship", "structure")},
+                    "design": kind,
+                    "given": kind not in row["refused"],
+                    "steers": fate["lost"] == 0,
+                    **fate,
+                }
+            )
+    return pd.DataFrame(found)
 
 
 def main() -> None:
@@ -173,7 +136,9 @@ def main() -> None:
         if (name, structure, seed) not in kept:
             kept.add(case(name, structure, seed))
             print(structure, name, file=sys.stderr, flush=True)
-    print(table_of_given(kept.rows), table_of_paths(kept.rows), sep="\n\n")
+    found = fates(kept.rows)
+    print(pd.crosstab(found["structure"], [found["given"], found["steers"]]))
+    print(found.pivot_table("cost", ["ship", "structure"], "design").round(1))
 
 
 if __name__ == "__main__":

@@ -172,21 +172,16 @@ def _metrics(episodes: pd.DataFrame) -> dict[tuple[str, ...], dict[str, Any]]:
     """
     figures = episodes.columns.difference(KEYS, sort=False)
     groups = episodes.groupby(["task", "set", "controller"])[list(figures)]
-    statistics = {
-        "mean": groups.mean(),
-        "median": groups.median(),
-        "p95": groups.quantile(0.95),
-    }
-    metrics = {}
-    for key in groups.groups:
-        known = statistics["mean"].loc[key].dropna().index
-        metrics[key] = {
-            figure: {
-                name: finite(of.at[key, figure]) for name, of in statistics.items()
-            }
-            for figure in known
-        }
-    return metrics
+    found: dict[tuple[str, ...], dict[str, Any]] = {}
+    for name, table in (
+        ("mean", groups.mean()),
+        ("median", groups.median()),
+        ("p95", groups.quantile(0.95)),
+    ):
+        for key, row in table.iterrows():
+            for figure, value in row.dropna().items():
+                found.setdefault(key, {}).setdefault(figure, {})[name] = float(value)
+    return found
 
 
 def _sort_key(total: Mapping[str, Any]) -> tuple[float, ...]:

@@ -74,6 +74,8 @@ class BenchmarkTask:
         `Suite.source` of its suite.
     limits : mapping of str to float
         Largest values of figures (`agents.suites.limits`).
+    given : Scenario, optional
+        Of a model that is at hand, in no file and no suite.
     """
 
     name: str
@@ -88,6 +90,7 @@ class BenchmarkTask:
     rule: str = "preview-lq"
     suite: str = ""
     limits: Mapping[str, float] = field(default_factory=dict)
+    given: Scenario | None = None
 
     def __post_init__(self) -> None:
         if not self.environment.endswith(".py"):
@@ -129,7 +132,7 @@ class BenchmarkTask:
     @cached_property
     def design(self) -> Scenario:
         """Scenario that controllers are made for."""
-        return self._scenario(self.ship, self.options)
+        return self.given or self._scenario(self.ship, self.options)
 
     @property
     def sets(self) -> tuple[str, ...]:
@@ -165,7 +168,7 @@ class BenchmarkTask:
     @cached_property
     def ship(self) -> ShipModel:
         """Model that controllers are made for."""
-        return load_model(self.model)
+        return self.given.ship if self.given else load_model(self.model)
 
     @property
     def task(self) -> Task:
@@ -237,37 +240,3 @@ def with_terms(ship: ShipModel, terms: Mapping[str, Mapping[str, float]]) -> Shi
         envelope=None,
         provenance=None,
     )
-
-
-@dataclass(frozen=True)
-class ModelTask(BenchmarkTask):
-    """A task of a model that is at hand, in no file and no suite.
-
-    Attributes
-    ----------
-    given : Scenario
-        Model, task and domain randomisation.
-    """
-
-    given: Any = None
-
-    @classmethod
-    def of(cls, name: str, environment: str, scenario: Scenario) -> Self:
-        """Make the task of a scenario."""
-        return cls(name, environment, model=scenario.ship.name, given=scenario)
-
-    @property
-    def design(self) -> Scenario:
-        """Scenario that controllers are made for."""
-        found: Scenario = self.given
-        return found
-
-    @property
-    def design_task(self) -> Self:
-        """The task itself."""
-        return self
-
-    @property
-    def ship(self) -> ShipModel:
-        """Model of the scenario."""
-        return self.design.ship

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from agents.controllers.controller import Controller
 from agents.controllers.designs import design
 from agents.controllers.registry import controller_class
-from agents.suites.benchmark_task import ModelTask, Scenario
+from agents.suites.benchmark_task import BenchmarkTask, Scenario
 from agents.training.controller_search import (
     FoundSettings,
     SearchBudget,
@@ -78,7 +78,7 @@ def tuned_design(kind: str, model: ShipModel, seconds: float, tell: Progress) ->
     return Tuned(design(kind, given, found.settings), found, on_draws)
 
 
-def holds_draws(kind: str, drawn: ModelTask, alone: ModelTask) -> bool:
+def holds_draws(kind: str, drawn: BenchmarkTask, alone: BenchmarkTask) -> bool:
     """True if a design costs about as much on models drawn as on the model alone.
 
     Ships that are lost are charged so much that a search on them gives up steering for
@@ -97,11 +97,11 @@ def _told(tell: Progress, kind: str, spent: float, seconds: float, _: float) -> 
     tell(f"tuning {kind}", min(round(spent), round(seconds)), round(seconds))
 
 
-def model_task(environment: str, model: ShipModel, task: Task) -> ModelTask:
+def model_task(environment: str, model: ShipModel, task: Task) -> BenchmarkTask:
     """Task of models drawn from the covariance of one, where it has one."""
     drawn = None if model.covariance is None else "covariance"
     scenario = Scenario(model, task, Randomisation(model_uncertainty=drawn))
-    return ModelTask.of(environment, environment, scenario)
+    return BenchmarkTask(environment, environment, model.name, given=scenario)
 
 
 def path_task(model: ShipModel) -> Task:
