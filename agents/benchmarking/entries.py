@@ -43,7 +43,7 @@ from agents.controllers.registry import (
     register_controller,
 )
 from agents.controllers.task_rule import TaskRule
-from agents.suites.suite import BenchmarkTask
+from agents.suites.suite import BenchmarkTask, suite_file
 from shipgym import load_model
 from shipgym.checks import did_you_mean, quoted
 from shipgym.envs.engine import Engine
@@ -336,13 +336,12 @@ def source_files(text: str, task: BenchmarkTask) -> list[Path]:
     """Files from which a text's controllers are made for a task, in order."""
     if names_code(text):
         return _module_files(text)
-    if text == SHIPPED:
-        agent = PRETRAINED / f"{task.environment}-{text}.json"
-        if agent.is_file():
-            return [agent]
-        return []
+    kept = {SHIPPED: PRETRAINED / f"{task.environment}-{text}.json"}
+    if text.startswith(TUNED):
+        kept[text] = suite_file(task.suite, "tuned")
     if text in known_names():
-        return []
+        path = kept.get(text)
+        return [path] if path and path.is_file() else []
     pattern = text.replace("{task}", task.name)
     return _matching_files(pattern)
 
