@@ -69,15 +69,18 @@ class Cell:
         for on, figures in self.figures.items():
             n_runs, n_episodes = figures["cost"].shape
             seeds = judging_seeds(on, n_episodes, options.seed)
-            keys = {
+            runs = np.arange(n_runs)
+            columns: dict[str, Any] = {
                 "controller": controller,
                 "task": task,
                 "set": on,
-                "run": np.repeat(np.arange(n_runs), n_episodes),
+                "run": np.repeat(runs, n_episodes),
                 "seed": np.tile(seeds, n_runs),
             }
-            columns = {name: values.ravel() for name, values in figures.items()}
-            tables.append(pd.DataFrame({**keys, **columns}))
+            for name, values in figures.items():
+                columns[name] = values.ravel()
+            table = pd.DataFrame(columns)
+            tables.append(table)
         return pd.concat(tables, ignore_index=True)
 
 

@@ -44,12 +44,16 @@ def write_page(result: BenchmarkResult, path: str | Path) -> None:
     check_page(target)
     summary = result.summary
     limits = {}
-    metrics = {}
+    metrics: dict[str, dict[str, str]] = {}
     for task, about in summary["suite"]["tasks"].items():
         limits[task] = _limits_text(about["limits"])
-        cells = result.cells(task).values()
-        known = {name for cell in cells for name in cell["metrics"]}
-        metrics[task] = {name: METRICS[name] for name in METRICS if name in known}
+        known: set[str] = set()
+        for cell in result.cells(task).values():
+            known |= cell["metrics"].keys()
+        metrics[task] = {}
+        for name, title in METRICS.items():
+            if name in known:
+                metrics[task][name] = title
     options = summary["options"]
     seeds = judging_seeds("ship", options["episodes"], options["seed"])
     shown = {

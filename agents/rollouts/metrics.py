@@ -66,17 +66,20 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         broken = during(run, CONSTRAINT + name) > 0.0
         intervals = total(broken)
         violated[f"violated_{name}"] = ratio(intervals, run.steps)
+    terminated = lost.astype(np.float64)
+    failed = run.failed.astype(np.float64)
+    heel = largest_heel(run)
     return {
         **costs(run),
         **steering(run),
         **followed,
         **violated,
         "success": success,
-        "heel_deg": largest_heel(run),
+        "heel_deg": heel,
         "speed_lost_percent": speed_lost(run),
         "extrapolating": mean(run, "extrapolating"),
-        "terminated": lost.astype(np.float64),
-        "failed": run.failed.astype(np.float64),
+        "terminated": terminated,
+        "failed": failed,
     }
 
 
