@@ -40,7 +40,7 @@ def main() -> None:
         kinds = (
             given.controllers.split(",") if task.design.task.follows_path else ["lq"]
         )
-        for kind in kinds if task.rule.startswith("tuned-") else ():
+        for kind in kinds if task.part == "steering" else ():
             of_task: dict[str, Any] = known.setdefault(task.name, {})
             runs = of_task.setdefault(kind, [])
             for seed in range(len(runs), given.runs):

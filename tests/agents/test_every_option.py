@@ -80,12 +80,13 @@ LINES = (
     (f"tune ppo {TASK} --model mariner --out study2", 2),
     (
         "benchmark --controllers pid,lq --suite small.toml --tasks calm --episodes 2"
-        " --workers 1 --engine local --page --allow-code reward.py --out results",
+        " --workers 1 --engine local --page --allow-code reward.py --seed 1 --runs 2"
+        " --out results",
         0,
     ),
     (
         "benchmark --controllers pid,lq --suite small.toml --tasks calm --episodes 2"
-        " --workers 1 --resume --no-page --out results",
+        " --workers 1 --resume --no-page --seed 1 --runs 2 --out results",
         0,
     ),
     ("benchmark --controllers pid --address 127.0.0.1:9 --out results2", 2),
