@@ -203,8 +203,11 @@ def _named(given: Any) -> tuple[str, Any]:
         name, equals, source = (part.strip() for part in given.partition("="))
         return (name, source) if equals else (_short_name(name), name)
     # an object is known by its name, a function by its own, others by their class
-    own: Any = getattr(given, "name", None) or getattr(given, "__name__", "")
-    return str(own or type(given).__name__), given
+    kind = type(given).__name__
+    own: Any = getattr(given, "name", None)
+    if not own:
+        own = getattr(given, "__name__", kind)
+    return str(own), given
 
 
 def _short_name(text: str) -> str:

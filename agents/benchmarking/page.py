@@ -55,24 +55,31 @@ def write_page(result: BenchmarkResult, path: str | Path) -> None:
             if name in known:
                 metrics[task][name] = title
     options = summary["options"]
-    seeds = judging_seeds("ship", options["episodes"], options["seed"])
+    episodes, seed = options["episodes"], options["seed"]
+    seeds = judging_seeds("ship", episodes, seed)
+    first, last = seeds[0], seeds[-1]
+    lead = _lead(result)
     shown = {
         **summary,
-        "lead": _lead(result),
+        "lead": lead,
         "failures": result.failures,
         "limits": limits,
         "metrics": metrics,
         "titles": TITLES,
         "command": command(result),
-        "seeds": f"{seeds[0]} to {seeds[-1]}",
+        "seeds": f"{first} to {last}",
     }
-    write_text(render("agents.benchmarking/page.html", **shown), target)
+    page = render("agents.benchmarking/page.html", **shown)
+    write_text(page, target)
 
 
 def _lead(result: BenchmarkResult) -> str:
+    summary = result.summary
     controllers = counted(len(result.ranking), "controller")
-    tasks = counted(result.summary["suite"]["n_tasks"], "task")
-    episodes = counted(result.summary["options"]["episodes"], "episode")
+    n_tasks = summary["suite"]["n_tasks"]
+    n_episodes = summary["options"]["episodes"]
+    tasks = counted(n_tasks, "task")
+    episodes = counted(n_episodes, "episode")
     return f"{controllers} in {len(result.tasks)} of {tasks}, {episodes} of each set."
 
 
@@ -92,7 +99,9 @@ def command(result: BenchmarkResult) -> str:
     controllers = []
     for name, about in summary["controllers"].items():
         source = about["source"] or "..."
-        controllers.append(source if source == name else f"{name}={source}")
+        if source != name:
+            source = f"{name}={source}"
+        controllers.append(source)
 
     suite = summary["suite"]
     words = ["shipgym", "benchmark", "--controllers", ",".join(controllers)]

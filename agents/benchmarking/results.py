@@ -127,9 +127,10 @@ class BenchmarkResult:
                 for name, cell in cells.items():
                     row = {"controller": name, "task": task, "set": on}
                     for part in ("cost", "score"):
-                        low, high = cell[part]["low"], cell[part]["high"]
-                        row |= {part: cell[part]["value"]}
-                        row |= {f"{part}_low": low, f"{part}_high": high}
+                        found = cell[part]
+                        row[part] = found["value"]
+                        row[f"{part}_low"] = found["low"]
+                        row[f"{part}_high"] = found["high"]
                     row |= {part: cell[part] for part in ("runs", "lost", "failed")}
                     metrics = cell["metrics"].items()
                     rows.append({**{one: of["mean"] for one, of in metrics}, **row})

@@ -51,10 +51,14 @@ class Draws:
         """
         n_runs, n = values.shape
         random = np.random.default_rng([self.seed, *task.encode()])
-        counts: Integers = random.multinomial(n, np.full(n, 1.0 / n), self.n_draws)
-        by_run = counts / n @ values.T
-        runs = random.integers(n_runs, size=(self.n_draws, n_runs))
-        means: Floats = np.take_along_axis(by_run, runs, axis=1).mean(axis=1)
+        even = np.full(n, 1.0 / n)
+        counts: Integers = random.multinomial(n, even, self.n_draws)
+        shares = counts / n
+        by_run = shares @ values.T
+        size = self.n_draws, n_runs
+        runs = random.integers(n_runs, size=size)
+        drawn = np.take_along_axis(by_run, runs, axis=1)
+        means: Floats = drawn.mean(axis=1)
         return means
 
 

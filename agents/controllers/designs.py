@@ -50,7 +50,8 @@ def design(
     made: Any = controller_class(kind)
     given = dict(settings or for_sea(made, task.task))
     if not made.has_autopilot:
-        ship = _Ship(task.ship, model_hash(task.ship))
+        sha256 = model_hash(task.ship)
+        ship = _Ship(task.ship, sha256)
         interval = task.task.interval(task.ship)
         text = json.dumps(given, sort_keys=True)
         return _designed(made, ship, interval, text)
