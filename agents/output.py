@@ -108,8 +108,11 @@ def _writing(folder: Path) -> Iterator[None]:
     """Say that a folder cannot be written where the system refuses it."""
     try:
         yield
-    except OSError as error:
-        reason = error.strerror or error
+    except (OSError, InputError) as error:
+        cause = error if isinstance(error, OSError) else error.__cause__
+        if not isinstance(cause, OSError):
+            raise
+        reason = cause.strerror or cause
         raise InputError(f"{folder}: cannot be written ({reason})") from error
 
 
