@@ -126,7 +126,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
         train_command,
         "sac --env path-following --model my_ship/model.json --out run/",
     ),
-    "tune": (tune_command, "sac --trials 40 --workers 2 --out study/"),
+    "tune": (tune_command, "sac --trials 40 --out study/"),
     "benchmark": (
         benchmark_command,
         "--suite shipgym-v1 --controllers pid,lq,ppo --out results/",
