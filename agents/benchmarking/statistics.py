@@ -95,7 +95,8 @@ def mean_score(
         cost, rule_cost = costs[task], rule_costs[task]
         scores.append(_score(cost.mean(), rule_cost.mean()))
         of_rule = draws.means(rule_cost, task)
-        drawn_scores.append(_score(draws.means(cost, task), of_rule))
+        drawn = draws.means(cost, task)
+        drawn_scores.append(_score(drawn, of_rule))
     if not scores:
         return interval(np.nan, np.zeros(0))
     return interval(float(geometric_mean(scores)), geometric_mean(drawn_scores))
@@ -111,7 +112,8 @@ def improvement(
     shares = []
     drawn_shares = []
     for task in sorted(costs.keys() & rule_costs.keys()):
-        cost, rule_cost = costs[task][:, None], rule_costs[task]
+        cost = costs[task][:, None]
+        rule_cost = rule_costs[task]
         wins = (cost < rule_cost) + 0.5 * (cost == rule_cost)
         by_run = wins.mean(axis=1)
         shares.append(by_run.mean())

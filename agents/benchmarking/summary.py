@@ -93,7 +93,8 @@ class Summary:
                 cell = self.cells[name, task.name]
                 if cell.refused:
                     continue
-                costs = {task.name: self.costs(name, on)[task.name]}
+                every = self.costs(name, on)
+                costs = {task.name: every[task.name]}
                 rule = self.costs("", on)
                 figures = cell.figures[on]
                 found[task.name][on][name] = {
@@ -134,7 +135,8 @@ class Summary:
             if task.part not in rankings:
                 totals = []
                 for name in self.names:
-                    totals.append(self._total(name, task.part, by_task))
+                    total = self._total(name, task.part, by_task)
+                    totals.append(total)
                 rankings[task.part] = sorted(totals, key=_sort_key)
         return rankings
 

@@ -168,7 +168,8 @@ def load_tuned(suite: str) -> dict[str, dict[str, Any]]:
     tasks = check_table(content.get("tasks"), f"{path}: tasks")
     settings = {}
     for name, controllers in tasks.items():
-        settings[name] = dict(check_table(controllers, f"{path}: tasks.{name}"))
+        table = check_table(controllers, f"{path}: tasks.{name}")
+        settings[name] = dict(table)
     return settings
 
 
