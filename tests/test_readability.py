@@ -96,8 +96,16 @@ def test_functions_are_no_denser_than_they_were(figure, package):
 
 
 def private_names(text):
-    # of named tuples, of os, and of asyncio's loops
-    public = {"_replace", "_asdict", "_fields", "_make", "_exit", "_selector"}
+    # of named tuples, of os, of asyncio's loops and of notebooks
+    public = {
+        "_replace",
+        "_asdict",
+        "_fields",
+        "_make",
+        "_exit",
+        "_selector",
+        "_repr_html_",
+    }
     names = []
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.alias):

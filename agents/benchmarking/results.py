@@ -125,15 +125,8 @@ class BenchmarkResult:
         for task, sets in self.summary["tasks"].items():
             for on, cells in sets.items():
                 for name, cell in cells.items():
-                    row = {"controller": name, "task": task, "set": on}
-                    for part in ("cost", "score"):
-                        found = cell[part]
-                        row[part] = found["value"]
-                        row[f"{part}_low"] = found["low"]
-                        row[f"{part}_high"] = found["high"]
-                    row |= {part: cell[part] for part in ("runs", "lost", "failed")}
-                    metrics = cell["metrics"].items()
-                    rows.append({**{one: of["mean"] for one, of in metrics}, **row})
+                    place = {"controller": name, "task": task, "set": on}
+                    rows.append(place | _figures(cell))
         return pd.DataFrame(rows)
 
     def save(self, folder: str | Path) -> Self:
@@ -270,6 +263,17 @@ def versions() -> dict[str, str]:
         with suppress(PackageNotFoundError):
             found[package] = version(package)
     return found
+
+
+def _figures(cell: Mapping[str, Any]) -> dict[str, Any]:
+    figures = {name: of["mean"] for name, of in cell["metrics"].items()}
+    for part in ("cost", "score"):
+        found = cell[part]
+        figures[part] = found["value"]
+        figures[f"{part}_low"] = found["low"]
+        figures[f"{part}_high"] = found["high"]
+    counts = {part: cell[part] for part in ("runs", "lost", "failed")}
+    return figures | counts
 
 
 def _about_entry(

@@ -81,17 +81,21 @@ def benchmark(
     for task in selected:
         # no other entry has no name
         everyone.setdefault(task.rule, Entry(f" {task.rule}", task.rule))
+    pairs = [
+        (entry, task)
+        for entry, task in product(
+            dict.fromkeys([*entries, *everyone.values()]), selected
+        )
+        if entry in entries or entry.source == task.rule
+    ]
 
     def run(where: JobEngine) -> BenchmarkResult:
         jobs = {}
         cells = {}
-        for entry, task in product(
-            dict.fromkeys([*entries, *everyone.values()]), selected
-        ):
-            is_wanted = entry in entries or entry.source == task.rule
-            if is_wanted and entry.is_text:
+        for entry, task in pairs:
+            if entry.is_text:
                 jobs[entry.name, task.name] = job_of(entry, task, options)
-            elif is_wanted:  # no other process can make objects
+            else:  # no other process can make objects
                 cells[entry.name, task.name] = run_cell(entry, task, options)
         on_progress = progress and partial(progress, "tasks done")
         results = run_jobs(run_job, list(jobs.values()), where, on_progress)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -89,26 +90,29 @@ class Summary:
         found: dict[str, dict[str, dict[str, Any]]] = {}
         for task in self.tasks:
             found[task.name] = {on: {} for on in task.sets}
-            for on, name in ((on, name) for on in task.sets for name in self.names):
-                cell = self.cells[name, task.name]
-                if cell.refused:
-                    continue
-                every = self.costs(name, on)
-                costs = {task.name: every[task.name]}
-                rule = self.costs("", on)
-                figures = cell.figures[on]
-                found[task.name][on][name] = {
-                    "cost": mean_cost(costs, self.draws),
-                    "score": mean_score(costs, rule, self.draws),
-                    "runs": len(figures["cost"]),
-                    "lost": int(figures["terminated"].sum()),
-                    "failed": int(figures["failed"].sum()),
-                    "failure": cell.failures.get(on, ""),
-                    "exceeded": exceeded(task.limits, metrics[task.name, on, name]),
-                    "microseconds_per_action": finite(1e6 * cell.seconds_per_action),
-                    "metrics": metrics[task.name, on, name],
-                }
+            for on, name in product(task.sets, self.names):
+                if not self.cells[name, task.name].refused:
+                    means = metrics[task.name, on, name]
+                    found[task.name][on][name] = self._of_cell(task, on, name, means)
         return found
+
+    def _of_cell(
+        self, task: BenchmarkTask, on: str, name: str, means: dict[str, Any]
+    ) -> dict[str, Any]:
+        cell = self.cells[name, task.name]
+        costs = {task.name: self.costs(name, on)[task.name]}
+        figures = cell.figures[on]
+        return {
+            "cost": mean_cost(costs, self.draws),
+            "score": mean_score(costs, self.costs("", on), self.draws),
+            "runs": len(figures["cost"]),
+            "lost": int(figures["terminated"].sum()),
+            "failed": int(figures["failed"].sum()),
+            "failure": cell.failures.get(on, ""),
+            "exceeded": exceeded(task.limits, means),
+            "microseconds_per_action": finite(1e6 * cell.seconds_per_action),
+            "metrics": means,
+        }
 
     def gap(self, task: str, by_task: ByTask) -> float | None:
         """Median over controllers of the cost on the ship by that on the model, less 1.

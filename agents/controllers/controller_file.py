@@ -168,8 +168,7 @@ def read_scales(value: Any, names: tuple[str, ...]) -> tuple[float, ...]:
     scales = []
     for i, name in enumerate(names):
         place = f"{where}[{i}] ('{name}')"
-        scale = _number(value[i], bounds, place)
-        scales.append(scale)
+        scales.append(_number(value[i], bounds, place))
     return tuple(scales)
 
 

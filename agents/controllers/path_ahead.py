@@ -58,9 +58,10 @@ class Arc:
 
         on_arc = entered & ~self.passed
         bent = np.where(on_arc, swept, 0.0)
+        along = self.radius * bent
         here = np.array(
             [
-                leg.begins + self.distance + self.radius * bent,
+                leg.begins + self.distance + along,
                 self.side * (self.radius - np.hypot(past, to_centre)),
                 leg.course + self.side * bent,
             ]

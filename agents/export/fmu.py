@@ -145,8 +145,8 @@ def _compiled(files: dict[str, str], name: str, path: Path) -> bytes:
             " an FMU holds a binary"
         )
     flags = ("-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off")
-    library = f"{name}.so"
-    command = [compiler, *flags, f"{name}_fmi.c", f"{name}.c", "-o", library, "-lm"]
+    sources = (f"{name}_fmi.c", f"{name}.c")
+    command = [compiler, *flags, *sources, "-o", "ship.so", "-lm"]
     with draft_folder(path.with_suffix(".build")) as folder:
         for file, text in files.items():
             if file.startswith("sources/"):
@@ -154,7 +154,7 @@ def _compiled(files: dict[str, str], name: str, path: Path) -> bytes:
         done = subprocess.run(
             command, cwd=folder, capture_output=True, text=True, check=False
         )
-        compiled = folder / library
+        compiled = folder / "ship.so"
         if done.returncode or not compiled.is_file():
             raise InputError(f"{compiler}: cannot compile the FMU: {done.stderr[:400]}")
         return compiled.read_bytes()

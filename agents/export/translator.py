@@ -71,7 +71,9 @@ class Translator:
         """Definitions of the functions that were asked for, and of what they call."""
         kept: list[str] = []
         for name, text in reversed(self._texts.items()):
-            if name in self._wanted or any(f"{name}(" in other for other in kept):
+            call = f"{name}("
+            is_called = any(call in other for other in kept)
+            if name in self._wanted or is_called:
                 kept.append(text)
         return kept[::-1]
 

@@ -217,11 +217,10 @@ def _array(parameter: Any) -> NDArray[np.float32]:
 def _check_extraction(network: Network, agent: Any, action: str) -> None:
     """Refuse a network that differs from its agent at random observations."""
     shape = agent.observation_space.shape
-    random = np.random.default_rng(0)
-    shown = random.uniform(-1.0, 1.0, (16, *shape)).astype(np.float32)
+    shown = np.random.default_rng(0).uniform(-1.0, 1.0, (16, *shape))
+    shown = shown.astype(np.float32)
     commands, _ = agent.predict(shown, deterministic=True)
-    n_inputs, *_ = network.sizes
-    agrees = np.prod(shape) == n_inputs
+    agrees = np.prod(shape) == network.sizes[0]
     if agrees:
         output = network(shown.reshape(len(shown), -1))
         if action == "rudder-discrete":

@@ -291,8 +291,11 @@ def _replay(agent: Any) -> dict[str, Any] | None:
     if buffer is None:
         return None
     filled = buffer.buffer_size if buffer.full else buffer.pos
-    arrays = {name: getattr(buffer, name)[:filled] for name in REPLAY}
-    return {name: torch.from_numpy(array) for name, array in arrays.items()}
+    tensors = {}
+    for name in REPLAY:
+        array = getattr(buffer, name)
+        tensors[name] = torch.from_numpy(array[:filled])
+    return tensors
 
 
 def _restore(agent: Any, content: dict[str, Any]) -> None:
