@@ -16,7 +16,10 @@ from shipgym.errors import InputError
 
 #: Where code is that is not a user's own.
 LIBRARIES = (
-    str(Path(__file__).parent),
+    *(
+        str(Path(__file__).parents[1] / name)
+        for name in ("shipgym", "identification", "agents")
+    ),
     *(get_path(name) for name in ("stdlib", "purelib", "platlib")),
 )
 
@@ -165,6 +168,15 @@ def place_of(function: Any, error: BaseException | None = None) -> str:
             line = frame.lineno or line
             name = frame.name
     return f"{file}, line {line}, in {name}"
+
+
+def told(error: BaseException) -> str:
+    """Kind and message of an error in a user's code, with the file and line."""
+    place = ""
+    for frame in extract_tb(error.__traceback__):
+        if not frame.filename.startswith(("<", *LIBRARIES)):
+            place = f" ({frame.filename}, line {frame.lineno})"
+    return f"{type(error).__name__}: {error}{place}"
 
 
 def nested_code(code: CodeType) -> Iterator[CodeType]:

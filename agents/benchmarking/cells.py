@@ -12,6 +12,7 @@ from agents.rollouts.metrics import evaluate
 from agents.suites.benchmark_task import BenchmarkTask, judging_seeds
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
+from shipgym.python_files import told
 
 Figures = dict[str, Floats]
 
@@ -98,7 +99,7 @@ def run_cell(entry: Entry, task: BenchmarkTask, options: Options) -> Cell:
         if entry.is_text and not entry.is_code:
             raise
         # a user's own function may raise anything
-        return Cell(refused=f"{type(error).__name__}: {error}")
+        return Cell(refused=told(error))
 
     figures: dict[str, Figures] = {}
     failures: dict[str, str] = {}

@@ -10,6 +10,7 @@ A controller is named, on the command line and in Python, as
     runs/{task}-*.json    one file for each task; several that match are runs
     my_module:factory     a function that returns a controller for a `BenchmarkTask`,
                           or a subclass of `agents.Controller`; its code is run
+    my_file.py:factory    the same in a file
     name=...              any of these under another name
 
 Runs are the unit: what searches or learns is made several times. A function that takes
@@ -28,6 +29,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from math import inf
 from pathlib import Path
+from symtable import symtable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,7 +51,7 @@ from shipgym.checks import did_you_mean, quoted
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.files import LARGEST_TENSORS, read_bytes
-from shipgym.python_files import working_folder
+from shipgym.python_files import load_file, working_folder
 
 SHIPPED = "ppo"  # agents of agents/pretrained, one for each environment
 RULE = "rule"  # of the task's own file
@@ -146,9 +148,9 @@ def known_names() -> tuple[str, ...]:
 
 
 def names_code(text: str) -> bool:
-    """Return whether a text names a function, `module:function`."""
+    """Return whether a text names a function, in a module or a file."""
     module, colon, function = text.rpartition(":")
-    parts = [*module.split("."), function]
+    parts = [function] if module.endswith(".py") else [*module.split("."), function]
     return bool(colon) and all(part.isidentifier() for part in parts)
 
 
@@ -240,11 +242,41 @@ def _check_text(text: str) -> None:
                 f"controllers: expected module:function, got '{text}', whose module"
                 " is not found in this folder or on Python's path"
             )
+        _check_function(text)
+    elif text.endswith(".py"):
+        raise InputError(
+            f"controllers: expected FILE.py:function, got '{text}'; name the function"
+            f" or class that makes a controller for a task, of"
+            f" {quoted(_names_in(Path(text)))}"
+        )
     elif not _matching_files(text):
         raise InputError(
             f"controllers: expected one of {quoted(known)}, an existing file of an"
             f" agent, or module:function, got '{text}'.{did_you_mean(text, known)}"
         )
+
+
+def _check_function(text: str) -> None:
+    """Refuse a function that its file does not have; nothing is run."""
+    file, _, name = text.rpartition(":")
+    if file.endswith(".py") and name not in (names := _names_in(Path(file))):
+        raise InputError(
+            f"controllers: expected a function or class of {file}, one of"
+            f" {quoted(names)}, got '{name}'.{did_you_mean(name, names)}"
+        )
+
+
+def _names_in(path: Path) -> tuple[str, ...]:
+    """Names that a Python file defines or imports, without running it."""
+    text = read_bytes(path, "Python file", LARGEST_TENSORS).decode("utf-8", "replace")
+    try:
+        symbols = symtable(text, str(path), "exec").get_symbols()
+    except (SyntaxError, ValueError) as error:
+        line = getattr(error, "lineno", 1)
+        raise InputError(f"{path}, line {line}: expected Python, got {error}") from None
+    return tuple(
+        one.get_name() for one in symbols if one.is_assigned() or one.is_imported()
+    )
 
 
 def _check_object(source: Any, name: str) -> None:
@@ -314,7 +346,9 @@ def _imported(text: str) -> Any:
     module, _, name = text.rpartition(":")
     try:
         with working_folder():
-            found = getattr(import_module(module), name)
+            is_file = module.endswith(".py")
+            holder = load_file(Path(module)) if is_file else import_module(module)
+            found = getattr(holder, name)
     except (ImportError, AttributeError) as error:
         raise InputError(
             f"controllers: expected module:function, got '{text}', which cannot be"
@@ -352,6 +386,8 @@ def source_files(text: str, task: BenchmarkTask) -> list[Path]:
 def _module_files(text: str) -> list[Path]:
     """File of the module that a function is named in; empty where it has none."""
     module, _, _ = text.rpartition(":")
+    if module.endswith(".py"):
+        return _matching_files(module)
     with working_folder(), suppress(ImportError):
         spec = find_spec(module)
         if spec is None or not spec.has_location:

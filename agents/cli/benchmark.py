@@ -27,7 +27,7 @@ Controllers = Annotated[
         help=(
             "What is compared, separated by commas: classical controllers (pid, lq,"
             " mpc, ...), tuned-pid, the shipped agent (ppo), files of agents,"
-            " module:function, name=..."
+            " my_file.py:function, module:function, name=..."
         )
     ),
 ]

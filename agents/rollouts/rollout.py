@@ -12,6 +12,7 @@ from agents.controllers.interface import Policy
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats
 from shipgym.envs.engine import Engine, episode_keys
+from shipgym.python_files import told
 from shipgym.tasks.task import Task
 
 Histories = dict[str, Floats]
@@ -201,7 +202,7 @@ class _Helmsman:
         except Exception as error:  # whatever a user's policy raises
             if not self.tolerant:
                 raise
-            fault = f"{type(error).__name__}: {error}"
+            fault = told(error)
         self.seconds += time.process_time() - began
         if not fault:
             given, fault = _numbers(actions, values.shape)

@@ -226,6 +226,37 @@ def test_wrong_controllers_are_refused(given, said):
         read_entries(given)
 
 
+PILOTS = """\
+class Pilot:
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return 1 / 0
+
+
+def factory(task):
+    return Pilot()
+"""
+
+
+def test_a_function_in_a_file_makes_a_controller_and_its_fault_has_a_line(
+    suite, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    file = Path("my_pilots.py")
+    file.write_text(PILOTS, "utf-8")
+    result = benchmark("my_pilots.py:factory", suite, "calm", episodes=2)
+    assert "my_pilots.py, line 3)" in result.failures[0]
+    for given, said in (
+        ("my_pilots.py", "expected FILE.py:function.* 'Pilot', 'factory'"),
+        ("my_pilots.py:factry", "got 'factry'. Did you mean 'factory'"),
+        ("no_pilots.py:factory", "whose module is not found"),
+    ):
+        with pytest.raises(InputError, match=said):
+            read_entries(given)
+    file.write_text("def factory(task:\n", "utf-8")
+    with pytest.raises(InputError, match=r"my_pilots\.py, line 1: expected Python"):
+        read_entries("my_pilots.py:factory")
+
+
 def test_controllers_are_given_as_texts_functions_objects_and_by_name():
     def make(task):
         return pid
