@@ -250,7 +250,6 @@ def test_what_trials_cannot_use_exits_with_2(words, message, tmp_path, monkeypat
         ("export zigzag_15_15.csv --c c", "log", "new-ship"),
         ("autopilot ship.toml --agent model.json --out out", "model file", "trials"),
         ("replay pid.json --out out.html", "controller file", "export"),
-        ("benchmark --controllers own.py --out out", "Python file", "benchmark"),
         ("trials .", "folder", None),
     ],
 )
@@ -262,7 +261,6 @@ def test_a_file_of_another_kind_is_named_with_the_command_for_it(
     ship = load_model("mariner")
     ship.save("model.json")
     PID.from_model(ship).save("pid.json")
-    Path("own.py").write_text("def helper(x):\n    return x\n")
     answer = shipgym(*words.split())
     assert answer.exit_code == 2
     given = f", got a {found}; give " + ("it to shipgym " if command else "model.json")
