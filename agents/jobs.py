@@ -210,6 +210,9 @@ def _in_processes(function: JobFunction, texts: list[str], workers: int) -> Fini
             results = run(_calls(function, texts))
         with warnings.catch_warnings(), closing(results) as finished:
             warnings.filterwarnings("ignore", ".*tasks which were still being")
+            # loky renews a worker whose memory has grown; raised in its thread, the
+            # warning would stop that thread, and the results would never come
+            warnings.filterwarnings("ignore", "A worker stopped while some jobs")
             yield from finished
     except BrokenProcessPool:
         raise _killed_worker() from None
