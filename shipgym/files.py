@@ -179,7 +179,7 @@ def _refusing_others(path: Path, what: str) -> Iterator[None]:
         yield
     except InputError:
         kind = ""
-        with suppress(OSError, ValueError):
+        with suppress(OSError, ValueError, RecursionError):
             if path.is_file():
                 kind = KIND_OF_SUFFIX.get(path.suffix.lower(), "log")
             if path.suffix == ".json":
@@ -188,8 +188,10 @@ def _refusing_others(path: Path, what: str) -> Iterator[None]:
         raise
 
 
-def _kind_of_json(content: Mapping[str, Any]) -> str:
+def _kind_of_json(content: Any) -> str:
     """What a JSON file seems to be; empty if that is not known."""
+    if not isinstance(content, Mapping):
+        return ""
     if "coefficients" in content:
         return "model file"
     if content.get("kind") == "episode":

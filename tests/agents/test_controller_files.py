@@ -86,8 +86,12 @@ BAD_FILES = [
     ("pid", {"observation_names": NAMES[:-1]}, "expected 8 observations, got 7"),
     ("pid", {"observation_scales": SCALES[:5]}, "scales: expected 8 numbers, got 5"),
     ("pid", {"observation_scales": [*SCALES[:7], -1.0]}, r"scales\[7\] \('heading"),
-    ("lqg", {"arrays__input": [1.0]}, "expected a list of 3|of shape"),
-    ("lqg", {"arrays__output": [[0.0] * 3]}, "arrays.output: .*expected a list of 2"),
+    ("lqg", {"arrays__input": [1.0]}, "arrays.input: expected a list of numbers, 3"),
+    (
+        "lqg",
+        {"arrays__output": [[0.0] * 3]},
+        "arrays.output: expected a list of numbers, 2 x 3",
+    ),
     ("lqg", {"arrays__output": [[2e9] * 3] * 2}, "of magnitude 1e.09 at most"),
     ("lqg", {"arrays__transition": []}, r"of shape \(states, states\)"),
     (
