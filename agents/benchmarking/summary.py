@@ -89,11 +89,14 @@ class Summary:
         metrics = _metrics(self.episodes)
         found: dict[str, dict[str, dict[str, Any]]] = {}
         for task in self.tasks:
-            found[task.name] = {on: {} for on in task.sets}
+            sets: dict[str, dict[str, Any]] = {on: {} for on in task.sets}
+            found[task.name] = sets
             for on, name in product(task.sets, self.names):
-                if not self.cells[name, task.name].refused:
-                    means = metrics[task.name, on, name]
-                    found[task.name][on][name] = self._of_cell(task, on, name, means)
+                cell = self.cells[name, task.name]
+                if cell.refused:
+                    continue
+                means = metrics[task.name, on, name]
+                sets[on][name] = self._of_cell(task, on, name, means)
         return found
 
     def _of_cell(

@@ -180,7 +180,8 @@ class LQGSettings(SteeringCost):
             return own
         for deviation in (2.0, 4.0, 8.0, 16.0, 32.0, 64.0):
             own = replace(own, disturbance_deg=deviation)
-            if LQG.of_settings(model, dt, own).margins.is_enough:
+            design = LQG.of_settings(model, dt, own)
+            if design.margins.is_enough:
                 break
         return own
 

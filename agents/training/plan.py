@@ -217,13 +217,14 @@ def _seas(task: Task, ship: ShipModel) -> list[Weather]:
     """Return the seas of a task, and the other sea states that its ship allows."""
     seas = list(task.seas)
     known = {sea.name for sea in seas}
+    substep = task.substep(ship)
     for name in ("calm", "slight", "moderate", "rough"):
         if name in known:
             continue
         sea = as_weather(name, "sea", None)
         with_current = replace(sea, current=task.weather.current)
         with suppress(InputError):
-            weather_column(ship, with_current, task.substep(ship), task.water_depth)
+            weather_column(ship, with_current, substep, task.water_depth)
             seas.append(with_current)
     return seas
 
