@@ -63,7 +63,7 @@ def without_sentinels(
         digits = f"{abs(number):.10g}".replace(".", "")
         are_nines = abs(number) >= 999.0 and set(digits) == {"9"}
         others = np.abs(values[np.isfinite(values) & (values != number)])
-        is_far = others.size and abs(number) > 3.0 * others.max()
+        is_far = others.size and abs(number) / 3.0 > others.max()
         is_place = channel in ("x", "y")  # which may be that far
         if number not in known and (is_place or not are_nines):
             continue

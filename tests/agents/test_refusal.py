@@ -173,4 +173,4 @@ def test_a_model_that_is_refused_gives_a_report_that_says_why(chain, tmp_path):
     assert names == ["metrics.json", "report.html"]
     page = (tmp_path / "report.html").read_text()
     assert f"No autopilot is given: {why}" in page
-    assert "Worst errors on held-out trials: " in page
+    assert "Worst error on held-out trials: " in page

@@ -214,8 +214,8 @@ def test_its_file_holds_numbers_only(
     fields = json.loads(path.read_text())
     for field, value, message in (
         ("centres", [[0.0, 1.0, "x", 2.0]], "structure.kernel"),
-        ("scale", [0.0, 1.0, 1.0, 1.0], "offset, scale, centres and basis"),
-        ("basis", [[1.0]], "offset, scale, centres and basis"),
+        ("scale", [0.0, 1.0, 1.0, 1.0], "kernel: expected a scale above 0"),
+        ("basis", [[1.0]], "rows in centres and basis"),
         ("centres", None, "structure.kernel.centres"),
         ("code", "1", "code"),
     ):

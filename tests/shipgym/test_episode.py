@@ -15,6 +15,7 @@ def states(**more):
     known = {
         name: np.linspace(0.1, 1.0 / 3.0, STEPS + 1) + k for k, name in enumerate(names)
     }
+    known["delta"] -= 6.0  # radians of a rudder
     return known | more
 
 

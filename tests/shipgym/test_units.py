@@ -28,7 +28,6 @@ from shipgym.trials.units import QUANTITIES, UNITS, si_factor, si_unit
             {
                 "m": 1,
                 "km": constants.kilo,
-                "ft": constants.foot,
                 "nm": constants.nautical_mile,
             },
         ),

@@ -130,7 +130,7 @@ def _at_windows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 def _without_trend(t: Floats, values: Floats) -> Floats:
     """Values at the windows' edges without their line: a rate sensor has a bias."""
-    time = _at_windows(t - t[0])
+    time = _at_windows((t - t[0]) / (t[-1] - t[0]))
     at_edges = _at_windows(values)
     left: Floats = at_edges - np.polyval(np.polyfit(time, at_edges, deg=1), time)
     return left
