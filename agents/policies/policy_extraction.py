@@ -217,8 +217,8 @@ def _array(parameter: Any) -> NDArray[np.float32]:
 def _check_extraction(network: Network, agent: Any, action: str) -> None:
     """Refuse a network that differs from its agent at random observations."""
     shape = agent.observation_space.shape
-    shown = np.random.default_rng(0).uniform(-1.0, 1.0, (16, *shape))
-    shown = shown.astype(np.float32)
+    drawn = np.random.default_rng(0).uniform(-1.0, 1.0, (16, *shape))
+    shown = drawn.astype(np.float32)
     commands, _ = agent.predict(shown, deterministic=True)
     agrees = np.prod(shape) == network.sizes[0]
     if agrees:

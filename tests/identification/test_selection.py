@@ -12,6 +12,7 @@ from identification import LSSVM, IdentificationResult, identify
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.models.linear import straight_running
+from shipgym.trials.derivatives import time_derivative
 
 Auto = Callable[..., IdentificationResult]
 
@@ -112,7 +113,7 @@ def logged(ship: ShipModel, *angles: float) -> list[Trial]:
     for angle in angles:
         run = zigzag(ship, abs(angle), abs(angle), angle < 0, 400, 1.0)
         psi = run["psi"] + np.radians(0.1) * rng.standard_normal(len(run))
-        rate = np.gradient(psi, run.t)
+        rate = time_derivative(run.t, psi)
         trial = Trial(
             run.t,
             {"psi": psi, "r": rate, "delta": run["delta"]},
