@@ -60,11 +60,10 @@ def test_costs_are_those_of_the_environment():
     assert sail(PILOT, MARINER, SHORT.changed(dt=0.5), seeds=0).duration_s == 75.0
     env = gymnasium.make("shipgym/CourseKeeping-v0", model=MARINER, episode_steps=150)
     observation, _ = env.reset(seed=0)
-    cost, errors, over = 0.0, [], False
+    cost, errors, over, state = 0.0, [], False, None
     while not over:
-        observation, _, terminated, truncated, info = env.step(
-            PILOT.predict(observation)[0]
-        )
+        action, state = PILOT.predict(observation, state)
+        observation, _, terminated, truncated, info = env.step(action)
         cost += info["cost"]
         errors.append(info["heading_error"])
         over = terminated or truncated
@@ -109,9 +108,10 @@ def test_a_step_response_is_the_environments_own_turn():
     step_deg = float(np.degrees(first["set_point"][0] - first["psi"][0]))
     for pilot in (PILOT, LQ.from_model(MARINER)):
         observations = engine.reset([3])
-        turned = [0.0]
+        turned, state = [0.0], None
         for _ in range(90):
-            observations, *_ = engine.step(pilot.predict(observations)[0])
+            action, state = pilot.predict(observations, state)
+            observations, *_ = engine.step(action)
             turned.append(float(engine.physical_state()["psi"][0] - first["psi"][0]))
         shown = step_response(pilot, MARINER, step_deg, duration=90.0)
         np.testing.assert_allclose(shown.heading[0], turned, atol=2e-6)

@@ -37,14 +37,15 @@ def test_the_graph_commands_what_the_policy_does(name):
     session = opened(policy)
     random = np.random.default_rng(0)
     for n in (1, 64):
-        state, past = None, None
+        state, base_state, past = None, None, None
         for step in range(4):
             seen = random.uniform(-1.0, 1.0, (n, 8)).astype(np.float32)
             expected, state = policy.predict(seen, state, np.full(n, step == 0))
             past = [seen] * policy.frame_stack if past is None else [*past[1:], seen]
             inputs = {"observations": np.concatenate(past, axis=1)}
             if policy.base is not None:
-                inputs["base_action"] = policy.base.predict(seen)[0]
+                base_action, base_state = policy.base.predict(seen, base_state)
+                inputs["base_action"] = base_action
             (action,) = session.run(["action"], inputs)
             np.testing.assert_allclose(action, expected, rtol=0.0, atol=1e-6)
 

@@ -138,7 +138,7 @@ def test_a_browser_without_network_draws_every_figure_also_for_paper(chain):
     browser = Browser()
     try:
         browser.open(address)
-        browser.wait("document.querySelectorAll('.plot.js-plotly-plot').length === 7")
+        browser.wait("document.querySelectorAll('.plot.js-plotly-plot').length === 6")
         browser.run("window.print = () => { window.printed = true; }")
         browser.click(".print")
         browser.wait("window.printed")
@@ -147,7 +147,7 @@ def test_a_browser_without_network_draws_every_figure_also_for_paper(chain):
             " plot._fullLayout.width)"
         )
         browser.run("window.dispatchEvent(new Event('beforeprint'))")
-        assert browser.run(widths) == 7 * [690]  # as wide as the paper
+        assert browser.run(widths) == 6 * [690]  # as wide as the paper
         browser.run("window.dispatchEvent(new Event('afterprint'))")
         assert min(browser.run(widths)) > 690
         assert (browser.complaints, browser.requests) == ([], [address])
@@ -208,7 +208,7 @@ def test_hostile_names_of_ship_trials_and_autopilots_stay_text(chain, tmp_path):
     )
     write_report(hostile, tmp_path / "report.html")
     source = (tmp_path / "report.html").read_text()
-    assert Page(source).scripts == 9  # plotly.js, seven figures, printing
+    assert Page(source).scripts == 8  # plotly.js, six figures, printing
     assert "<script>alert" not in source
     assert f"{HOSTILE}0" in " ".join(Page(source).text)
     assert HOSTILE.upper() in " ".join(Page(source).text)
