@@ -67,7 +67,10 @@ class KeptResults:
     def load(self, job: str) -> str | None:
         """Result of a job, None if there is none or its file is broken."""
         try:
-            result: str = read_json(self.path(job), "result", "it is run again")[job]
+            kept = read_json(self.path(job), "result", "it is run again")
+            if kept["job"] != job:
+                return None
+            result: str = kept["result"]
             result_from_json(result)
         except Exception:  # there are many ways to be broken
             return None
@@ -76,7 +79,7 @@ class KeptResults:
     def save(self, job: str, result: str) -> None:
         """Write the result of a job, whole or not at all."""
         make_folder(self.folder)
-        write_json({job: result}, self.path(job))
+        write_json({"job": job, "result": result}, self.path(job))
 
     def path(self, job: str) -> Path:
         """Return the file of a job."""
