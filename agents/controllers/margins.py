@@ -1,7 +1,7 @@
 """Margins and bandwidth of the loop of a linear controller around a sampled ship."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,21 +171,33 @@ def crossings(omega: Floats, response: Complexes) -> Crossings:
     `omega`: rad/s; `response`: at these frequencies, the last of which is Nyquist's,
     where it is real.
     """
-    before, after = response[:-1], response[1:]
-    place = np.flatnonzero(np.diff(response.imag > 0.0))
-    share = before.imag[place] / (before.imag[place] - after.imag[place])
-    real = before.real[place] + share * (after.real[place] - before.real[place])
-    real = np.append(real, response.real[-1])
-
+    real = _on_the_axis(response)
     size = np.log(np.abs(response))
-    place = np.flatnonzero(np.diff(size > 0.0))
-    share = size[place] / (size[place] - size[place + 1])
-    turned = share * np.angle(after[place] / before[place])
-    phases = np.degrees(np.angle(-before[place]) + turned)
+    place, share = _changes_of_sign(size)
+    before = response[place]
+    turned = share * np.angle(response[place + 1] / before)
+    phases = np.degrees(np.angle(-before) + turned)
     phases = (phases + 180.0) % 360.0 - 180.0
-    at = omega[place] * (omega[place + 1] / omega[place]) ** share
+    growth = omega[place + 1] / omega[place]
+    at = omega[place] * growth**share
     delays = np.radians(phases % 360.0) / at
     return Crossings(-1.0 / real[real < 0.0], phases, delays)
+
+
+def _on_the_axis(response: Complexes) -> Floats:
+    """Where a response is real, on straight lines, and at its end."""
+    place, share = _changes_of_sign(response.imag)
+    before = response.real[place]
+    after = response.real[place + 1]
+    real = before + share * (after - before)
+    return np.append(real, response.real[-1])
+
+
+def _changes_of_sign(values: Floats) -> tuple[Any, Floats]:
+    """Places before which values change their sign, and the share of the way to it."""
+    place = np.flatnonzero(np.diff(values > 0.0))
+    before = values[place]
+    return place, before / (before - values[place + 1])
 
 
 def least(values: Floats) -> float:

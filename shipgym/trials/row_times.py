@@ -100,8 +100,10 @@ def _padded(cells: list[str]) -> list[str]:
     if len(stamps) < 3 or not all(stamps):
         return []
     padded = [f"{stamp[1]}.{stamp[2]:0>9}" for stamp in stamps if stamp]
-    goes_back = np.any(np.diff(np.array(cells, dtype=np.float64)) <= 0.0)
-    increases = np.all(np.diff(np.array(padded, dtype=np.float64)) > 0.0)
+    given = np.array(cells, dtype=np.float64)
+    goes_back = np.any(np.diff(given) <= 0.0)
+    meant = np.array(padded, dtype=np.float64)
+    increases = np.all(np.diff(meant) > 0.0)
     return padded if goes_back and increases else []
 
 
