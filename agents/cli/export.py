@@ -38,10 +38,7 @@ def export_command(
         float, Option(metavar="M", help="For a model: water depth; default: deep.")
     ] = inf,
 ) -> None:
-    """Write an autopilot or a ship model as C99 or FMU.
-
-    Learned policies also as ONNX.
-    """
+    """Write an autopilot or a ship model as C99 or FMU, a learned policy as ONNX."""
     from agents.cli.terminal import answer, say, warn
     from shipgym.errors import InputError
 

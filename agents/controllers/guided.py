@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import ANY_NUMBER, Action, Bounds, Controller
-from agents.controllers.interface import Policy
 from agents.controllers.law import (
     Law,
     Number,
@@ -26,7 +25,7 @@ from agents.controllers.law import (
     wrapped,
 )
 from agents.controllers.lq import LQ
-from agents.controllers.margins import Compensator, Margins
+from agents.controllers.margins import Compensator
 from agents.controllers.memory import (
     checked_observation,
     from_columns,
@@ -80,13 +79,13 @@ class Guided(Controller):
         "task_lookahead": Bounds(1e-6, ANY_NUMBER.largest),
     }
 
-    autopilot: Policy  # steers by the first eight observations, those of course keeping
+    autopilot: Controller  # steers by the first eight observations
 
     @classmethod
     def leading(
         cls,
         model: ShipModel,
-        autopilot: Policy | None,
+        autopilot: Controller | None,
         task: Task,
         gains: Mapping[str, float],
         design: Mapping[str, float],
@@ -94,19 +93,17 @@ class Guided(Controller):
         """Make guidance of an autopilot, by default LQ, along the paths of a task.
 
         `gains`: SI units; `design`: how they were found. Raises InputError if the
-        autopilot was designed for another ship, or the task does not show what guidance
-        observes.
+        autopilot keeps no heading or was designed for another ship, or the task does
+        not show what guidance observes.
         """
         dt = task.interval(model)
-        if autopilot is None:
-            autopilot = LQ.from_model(model, dt=dt)
-        if isinstance(autopilot, Controller):
-            like: Controller = autopilot
-            margins = autopilot.margins
-        else:
-            like = LQ.from_model(model, dt=dt)
-            margins = Margins(np.inf, np.inf, np.inf, np.inf)
-        like.check_fits_model(model)
+        pilot = LQ.from_model(model, dt=dt) if autopilot is None else autopilot
+        if not isinstance(pilot, Controller) or pilot.has_autopilot:
+            raise InputError(
+                "autopilot: expected a controller that keeps a heading, got"
+                f" {type(pilot).__name__}"
+            )
+        pilot.check_fits_model(model)
 
         names = cls.observed_in(task, model)
         scales = _scales_of(task, model, names)
@@ -114,15 +111,15 @@ class Guided(Controller):
         design_model = {"ship": model} if cls.has_ship else {}
         return cls(
             gains={**gains, "task_lookahead": task_lookahead},
-            neutral_rudder=like.neutral_rudder,
-            neutral_sway=like.neutral_sway,
-            margins=margins,
+            neutral_rudder=pilot.neutral_rudder,
+            neutral_sway=pilot.neutral_sway,
+            margins=pilot.margins,
             observation_scales=scales,
             observation_names=names,
-            model_name=like.model_name,
-            model_sha256=like.model_sha256,
+            model_name=pilot.model_name,
+            model_sha256=pilot.model_sha256,
             design={"dt": dt, **design},
-            autopilot=autopilot,
+            autopilot=pilot,
             **design_model,
         )
 
@@ -253,26 +250,15 @@ class Guided(Controller):
 
     def loop(self) -> Compensator:
         """Loop of the heading autopilot: guidance is slower by far."""
-        return self.heading_autopilot("its margins").loop()
+        return self.autopilot.loop()
 
     def check_fits_model(self, model: ShipModel) -> None:
         """Refuse a ship that the autopilot was not designed for."""
-        if isinstance(self.autopilot, Controller):
-            self.autopilot.check_fits_model(model)
+        self.autopilot.check_fits_model(model)
 
     def to_dict(self) -> dict[str, Any]:
         """Content of the file, of guidance and autopilot."""
-        autopilot = self.heading_autopilot("a file").to_dict()
-        return {**super().to_dict(), "autopilot": autopilot}
-
-    def heading_autopilot(self, purpose: str) -> Controller:
-        """Autopilot, for a purpose that needs one of this package, else InputError."""
-        if isinstance(self.autopilot, Controller):
-            return self.autopilot
-        name = type(self.autopilot).__name__
-        raise InputError(
-            f"autopilot: expected a controller of shipgym for {purpose}, got {name}"
-        )
+        return {**super().to_dict(), "autopilot": self.autopilot.to_dict()}
 
 
 def lookahead_setting() -> Any:

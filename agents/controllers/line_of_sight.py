@@ -12,14 +12,13 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from agents.controllers.controller import ANY_NUMBER, Bounds
+from agents.controllers.controller import ANY_NUMBER, Bounds, Controller
 from agents.controllers.guided import (
     Guided,
     lookahead_setting,
     own_lookahead,
     with_path,
 )
-from agents.controllers.interface import Policy
 from agents.controllers.law import Number, PathSignals
 from agents.settings import Settings, Step, setting
 from shipgym import ShipModel
@@ -106,7 +105,7 @@ class IntegralLineOfSight(Guided):
         cls,
         model: ShipModel,
         *,
-        autopilot: Policy | None = None,
+        autopilot: Controller | None = None,
         task: Task | None = None,
         **settings: Any,
     ) -> Self:
@@ -119,9 +118,8 @@ class IntegralLineOfSight(Guided):
         ----------
         model : ShipModel
             The ship.
-        autopilot : Policy, optional
-            Any heading autopilot, also one that was learned; by default
-            `LQ.from_model(model)`.
+        autopilot : Controller, optional
+            Any that keeps a heading; by default `LQ.from_model(model)`.
         task : Task, optional
             Its lookahead, corridor and control interval are used; by default the
             environment's own.

@@ -19,9 +19,8 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from agents.controllers.controller import Bounds
+from agents.controllers.controller import Bounds, Controller
 from agents.controllers.guided import with_path
-from agents.controllers.interface import Policy
 from agents.controllers.law import (
     HelmMemory,
     Nothing,
@@ -134,7 +133,7 @@ class MPC(WheelOver):
         cls,
         model: ShipModel,
         *,
-        autopilot: Policy | None = None,
+        autopilot: Controller | None = None,
         task: Task | None = None,
         **settings: Any,
     ) -> Self:
@@ -363,7 +362,7 @@ class DesignModels:
         self.guide = guide
         self.dt = COARSE * guide.design["dt"]
         self.time = 0.0
-        self.feedback = guide.heading_autopilot("MPC").linear_feedback
+        self.feedback = guide.autopilot.linear_feedback
         self.crab_share = guide.gains["crab_share"]
         self.rudder_limit = guide.ship.steering.limit
         self.path = PathAhead(seen.turns, guide.gains["path_radius"])

@@ -21,7 +21,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from agents.controllers.controller import ANY_NUMBER, Bounds
+from agents.controllers.controller import ANY_NUMBER, Bounds, Controller
 from agents.controllers.guided import (
     COURSE_ERROR,
     TURNS,
@@ -30,7 +30,6 @@ from agents.controllers.guided import (
     own_lookahead,
     with_path,
 )
-from agents.controllers.interface import Policy
 from agents.controllers.law import (
     Number,
     PathSignals,
@@ -317,7 +316,7 @@ class PreviewSettings(Settings):
     )
 
     def completed(
-        self, model: ShipModel, task: Task, autopilot: Policy | None = None
+        self, model: ShipModel, task: Task, autopilot: Controller | None = None
     ) -> Self:
         """Fill in what follows from a model, a task and the autopilot that is led."""
         reach, share = self.reach_lengths, self.course_share
@@ -415,7 +414,7 @@ class PreviewLQ(Guided):
         cls,
         model: ShipModel,
         *,
-        autopilot: Policy | None = None,
+        autopilot: Controller | None = None,
         task: Task | None = None,
         **settings: Any,
     ) -> Self:
@@ -461,7 +460,7 @@ class PreviewLQ(Guided):
         return PreviewGains(**own)
 
 
-def led_lq(autopilot: Policy | None, model: ShipModel, task: Task) -> LQ:
+def led_lq(autopilot: Controller | None, model: ShipModel, task: Task) -> LQ:
     """LQ that is led, by default designed on the model; InputError for another kind."""
     if autopilot is None:
         return LQ.from_model(model, dt=task.interval(model))

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from agents.controllers.controller import ANY_NUMBER, Bounds
+from agents.controllers.controller import ANY_NUMBER, Bounds, Controller
 from agents.controllers.guided import (
     COURSE_ERROR,
     TURNS,
@@ -25,7 +25,6 @@ from agents.controllers.guided import (
     own_lookahead,
     with_path,
 )
-from agents.controllers.interface import Policy
 from agents.controllers.law import (
     Nothing,
     Number,
@@ -88,7 +87,7 @@ class WheelOverSettings(Settings):
     )
 
     def completed(
-        self, model: ShipModel, task: Task, autopilot: Policy | None = None
+        self, model: ShipModel, task: Task, autopilot: Controller | None = None
     ) -> Self:
         """Fill in what follows from a model, a task and the autopilot that is led."""
         reach = self.reach_lengths
@@ -132,7 +131,7 @@ class WheelOver(Guided):
         cls,
         model: ShipModel,
         *,
-        autopilot: Policy | None = None,
+        autopilot: Controller | None = None,
         task: Task | None = None,
         **settings: Any,
     ) -> Self:
@@ -173,7 +172,7 @@ class WheelOver(Guided):
         )
 
 
-def own_lead(model: ShipModel, autopilot: Policy | None) -> float:
+def own_lead(model: ShipModel, autopilot: Controller | None) -> float:
     """Distance ahead at which LQ has to see an arc to keep to it, ship lengths.
 
     In a steady turn the heading lags by what makes the rudder for it, and the way over

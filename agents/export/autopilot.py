@@ -4,13 +4,12 @@ It adds plain functions on records to a controller's law; `agents.export.autopil
 writes both as C. All numbers are in SI units.
 """
 
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from agents.controllers.controller import Controller
-from agents.controllers.guided import COURSE_ERROR, Guided, shown_course
+from agents.controllers.guided import Guided
 from agents.controllers.law import (
     Law,
     Nothing,
@@ -22,12 +21,7 @@ from agents.controllers.law import (
     wrapped,
 )
 from agents.export.source import Variable, Variables, variables_of
-from shipgym import InputError
-from shipgym.engine.records import field_types
-from shipgym.tasks import path_following
-from shipgym.tasks.contract import ObservationSpec
-from shipgym.tasks.scales import rounded_interval
-from shipgym.tasks.steering import Extras, SteeringSignals
+from shipgym.checks import check_choice
 
 
 class BridgeInput(NamedTuple):
@@ -80,21 +74,8 @@ class BridgeParameters(NamedTuple):
     dt: float  # s
     reach: float  # rad s, largest integral of the heading error
     limit: float  # rad, largest rudder
-    task_lookahead: float  # m, of the environment that a policy learned in
-    path_radius: float  # m
     law: Any  # parameters of its law
     guide: Any  # parameters of its guidance law
-
-
-class OwnObservations(NamedTuple):
-    """Observations that an autopilot derives from its set-point and its memory."""
-
-    heading_error_sin: Number
-    heading_error_cos: Number
-    last_command: Number  # rad
-    heading_error_integral: Number  # rad s
-    course_error_sin: Number
-    course_error_cos: Number
 
 
 Step = tuple[Number, BridgeState]
@@ -105,14 +86,7 @@ def heading_step(
 ) -> Step:
     """Order of an autopilot that keeps a heading, and its next state."""
     error = wrapped(given.set_point - given.heading)
-    order, after = heading_order(
-        error,
-        given,
-        state,
-        p,
-        law=law,
-    )
-    return limited(order, after, p)
+    return steered(error, given, state, p, law)
 
 
 def path_step(
@@ -123,43 +97,17 @@ def path_step(
     The set-point is the direction of the path beside the ship.
     """
     error = wrapped(given.set_point - given.heading)
-    order, after = path_order(
-        error,
-        given,
-        state,
-        p,
-        guide=guide,
-        law=law,
-    )
-    return limited(order, after, p)
-
-
-def base_path_step(
-    given: BridgeInput, state: BridgeState, p: BridgeParameters, guide: Law, law: Law
-) -> Step:
-    """Order of guidance that a policy adds to, and its next state.
-
-    The set-point is the course that the policy's environment shows.
-    """
-    error = wrapped(given.set_point - given.heading)
     seen = path_signals(error, given)
-    course = shown_course(seen, p.task_lookahead, p.path_radius)
-    from_path = wrapped(error - course)
-    order, after = path_order(
-        from_path,
-        given,
-        state,
-        p,
-        guide=guide,
-        law=law,
-    )
-    return limited(order, after, p)
+    course, guidance = guide(seen, state.guidance, p.guide)
+    to_course = wrapped(error + course)
+    order, after = steered(to_course, given, state, p, law)
+    return order, after._replace(guidance=guidance)
 
 
-def heading_order(
+def steered(
     error: Number, given: BridgeInput, state: BridgeState, p: BridgeParameters, law: Law
 ) -> Step:
-    """Rudder for a heading error, rad, not yet limited."""
+    """Rudder for a heading error, rad, within its limit, and the next state."""
     integral = gathered(
         state.integral,
         error,
@@ -177,23 +125,8 @@ def heading_order(
         last_order=state.last_command,
     )
     order, memory = law(seen, state.memory, p.law)
-    return order, state._replace(integral=integral, memory=memory)
-
-
-def path_order(
-    error: Number,
-    given: BridgeInput,
-    state: BridgeState,
-    p: BridgeParameters,
-    guide: Law,
-    law: Law,
-) -> Step:
-    """Rudder for a heading error, rad, against the path; it is not yet limited."""
-    seen = path_signals(error, given)
-    course, guidance = guide(seen, state.guidance, p.guide)
-    to_course = wrapped(error + course)
-    order, after = heading_order(to_course, given, state, p, law)
-    return order, after._replace(guidance=guidance)
+    command = np.clip(order, -p.limit, p.limit)
+    return command, BridgeState(integral, command, 1.0, memory, state.guidance)
 
 
 def path_signals(error: Number, given: BridgeInput) -> PathSignals:
@@ -218,123 +151,32 @@ def path_signals(error: Number, given: BridgeInput) -> PathSignals:
     )
 
 
-def limited(order: Number, state: BridgeState, p: BridgeParameters) -> Step:
-    """Order within the limit, and the state in which it is the last command."""
-    command = np.clip(order, -p.limit, p.limit)
-    return command, state._replace(last_command=command, started=1.0)
-
-
-def own_observations(
-    error: Number, integral: Number, given: BridgeInput, last_command: Number
-) -> OwnObservations:
-    """Observations of the error of heading, rad, and of the course over ground."""
-    course_error = given.set_point - given.course
-    return OwnObservations(
-        heading_error_sin=np.sin(error),
-        heading_error_cos=np.cos(error),
-        last_command=last_command,
-        heading_error_integral=integral,
-        course_error_sin=np.sin(course_error),
-        course_error_cos=np.cos(course_error),
+def bridge_parameters(controller: Controller) -> BridgeParameters:
+    """Parameters of a controller."""
+    scales = dict(
+        zip(controller.observation_names, controller.observation_scales, strict=True)
     )
-
-
-def policy_observations(
-    given: BridgeInput, state: BridgeState, p: BridgeParameters
-) -> tuple[OwnObservations, BridgeState]:
-    """Observations of a policy's set-point and memory, and its next state."""
-    error = wrapped(given.set_point - given.heading)
-    integral = gathered(
-        state.integral,
-        error,
-        started=state.started,
-        dt=p.dt,
-        reach=p.reach,
-    )
-    own = own_observations(error, integral, given, state.last_command)
-    return own, state._replace(integral=integral)
-
-
-@cache
-def observation_bounds() -> dict[str, tuple[float, float]]:
-    """Bounds of observations by name, in multiples of their scale."""
-    kinds: dict[str, Any] = {}
-    for record in (SteeringSignals, Extras, path_following.Observation):
-        kinds |= field_types(record, notes=True)
-
-    bounds = {}
-    for name, kind in kinds.items():
-        for note in getattr(kind, "__metadata__", ()):
-            if isinstance(note, ObservationSpec):
-                bounds[name] = (note.low, note.high)
-    return bounds
-
-
-def bridge_parameters(agent: Any) -> BridgeParameters:
-    """Parameters of a controller, or of a policy and the base that it adds to."""
-    scales = dict(zip(agent.observation_names, agent.observation_scales, strict=True))
-    if isinstance(agent, Controller):
-        controller: Any = agent
-        dt: Any = agent.design["dt"]
-    else:
-        controller = getattr(agent, "base", None)
-        dt = getattr(agent, "env_options", {}).get("dt")
-        dt = dt or rounded_interval(1.0 / scales["yaw_rate"])
-
-    without_guidance = BridgeParameters(
-        dt=float(dt),
+    pilot = controller.autopilot if isinstance(controller, Guided) else controller
+    guide = controller.parameters if isinstance(controller, Guided) else Nothing()
+    return BridgeParameters(
+        dt=float(controller.design["dt"]),
         reach=float(scales["heading_error_integral"]),
         limit=float(scales["rudder"]),
-        task_lookahead=1.0,
-        path_radius=1.0,
-        law=_law_parameters(controller),
-        guide=Nothing(),
-    )
-    if not isinstance(controller, Guided):
-        return without_guidance
-    return without_guidance._replace(
-        task_lookahead=controller.gains["task_lookahead"],
-        path_radius=controller.path_radius,
-        law=_law_parameters(controller.autopilot),
-        guide=controller.parameters,
+        law=pilot.parameters,
+        guide=guide,
     )
 
 
-def _law_parameters(agent: Any) -> Any:
-    """Parameters of a controller's law; none of a policy."""
-    return agent.parameters if isinstance(agent, Controller) else Nothing()
+def needed_inputs(controller: Controller) -> list[str]:
+    """Inputs that a controller reads, in the order of `BridgeInput`.
 
-
-def needed_inputs(agent: Any) -> list[str]:
-    """Inputs that an autopilot reads, in the order of `BridgeInput`.
-
-    Raises InputError for one that commands the shaft too, or reads what no ship is
-    known to show.
+    Raises InputError for a signal that no ship is known to show.
     """
-    known = BridgeInput._fields
-    names = {"set_point", "heading", *_needed(agent)}
-    action = getattr(agent, "action", "rudder")
-    if action == "rudder-shaft" or not names <= set(known):
-        read = ", ".join(sorted(names))
-        readable = ", ".join(known)
-        raise InputError(
-            "autopilot: expected a policy that commands the rudder alone, by"
-            f" {readable}, got one that commands {action} and"
-            f" reads {read[:200]}"
-        )
-    return [name for name in known if name in names]
-
-
-def _needed(agent: Any) -> set[str]:
-    """Names of inputs that an autopilot reads beside set-point and heading."""
-    if isinstance(agent, Controller):
-        names = set(agent.needed_signals)
-    else:
-        names = set(agent.observation_names)
-    by_course = ("drift", *COURSE_ERROR)  # which the course over ground shows
-    shown = {"course" if name in by_course else name for name in names}
-
-    inner = getattr(agent, "autopilot", None) or getattr(agent, "base", None)
-    if inner is not None:
-        shown |= _needed(inner)
-    return shown - set(OwnObservations._fields)
+    needed = {"set_point", "heading", *controller.needed_signals}
+    if isinstance(controller, Guided):
+        needed |= set(controller.autopilot.needed_signals)
+    # the course over ground shows the drift
+    inputs = {"course" if name == "drift" else name for name in needed}
+    for name in inputs:
+        check_choice(name, BridgeInput._fields, f"{controller.kind}: reads")
+    return [name for name in BridgeInput._fields if name in inputs]

@@ -1,12 +1,11 @@
 """Exported ships and autopilots: their C, made from templates, and their variables."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple
 
-import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 import shipgym
@@ -117,15 +116,6 @@ def _calls(text: str, function: str) -> bool:
     return re.search(rf"\b{function}\(", text) is not None
 
 
-def single_precision(numbers: Iterable[Any]) -> str:
-    """Numbers of an array in single precision as C initialises it."""
-    entries = []
-    for entry in numbers:
-        is_number = np.ndim(entry) == 0
-        entries.append(f"{entry:.9e}f" if is_number else single_precision(entry))
-    return f"{{{', '.join(entries)}}}"
-
-
 @cache
 def _environment() -> Environment:
     environment = Environment(
@@ -137,7 +127,6 @@ def _environment() -> Environment:
     environment.filters |= {
         "c": literal,
         "comment": comment,
-        "floats": single_precision,
     }
     environment.tests["calling"] = _calls
     return environment

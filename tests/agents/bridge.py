@@ -1,10 +1,7 @@
 """An exported autopilot in plain Python: the functions that become C, step by step."""
 
-from types import SimpleNamespace
-
 import numpy as np
 
-from agents import Controller
 from agents.controllers.guided import Guided
 from agents.controllers.law import Nothing
 from agents.controllers.memory import from_columns
@@ -14,14 +11,12 @@ from agents.export.autopilot import (
     bridge_parameters,
     heading_step,
     needed_inputs,
-    observation_bounds,
-    own_observations,
     path_step,
 )
 
 
 class Bridge:
-    """A controller or policy, stepped once a control interval in double precision."""
+    """A controller, stepped once a control interval in double precision."""
 
     def __init__(self, agent, limit=None):
         self.agent = agent
@@ -41,37 +36,17 @@ class Bridge:
     def step(self, given):
         """Ordered rudder, rad, for the numbers named in `inputs`."""
         numbers = {name: np.array([given[name]]) for name in self.inputs}
-        self.given = BridgeInput(**numbers)
-        known = self.given, self.state, self.parameters
+        known = BridgeInput(**numbers), self.state, self.parameters
+        law = lambda seen, memory, _: self.pilot.steer(seen, memory)  # noqa: E731
         if isinstance(self.agent, Guided):
             guide = lambda seen, memory, _: self.agent.course(seen, memory)  # noqa: E731
-            order, self.state = path_step(*known, guide, self.law)
+            order, self.state = path_step(*known, guide, law)
         else:
-            order, self.state = heading_step(*known, self.law)
+            order, self.state = heading_step(*known, law)
         return float(order[0])
-
-    def law(self, seen, memory, _):
-        """Rudder of the heading autopilot, by its law or by its network."""
-        if isinstance(self.pilot, Controller):
-            return self.pilot.steer(seen, memory)
-        error, integral = seen.heading_error, seen.heading_error_integral
-        last = self.state.last_command
-        own = own_observations(error, integral, self.given, last)
-        known = SimpleNamespace(**self.given._asdict(), **own._asdict())
-        shown = []
-        names, scales = self.pilot.observation_names, self.pilot.observation_scales
-        for name, scale in zip(names, scales, strict=True):
-            shown.append(
-                np.clip(getattr(known, name) / scale, *observation_bounds()[name])
-            )
-        starts = self.state.started == 0.0
-        action, memory = self.pilot.predict(np.array(shown).T, memory, starts)
-        return action[:, 0].astype(float) * self.limit, memory
 
 
 def no_memory(agent):
     """Memory of an autopilot that is switched on."""
-    if not isinstance(agent, Controller):
-        return None
     columns = iter(np.zeros((agent.memory_size, 1)))
     return from_columns(agent.memory_record, columns)

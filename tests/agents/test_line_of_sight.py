@@ -86,17 +86,9 @@ class Learned:
         return np.clip(observation[..., :1] - observation[..., 2:3], -1.0, 1.0), state
 
 
-def test_a_learned_autopilot_is_led_but_has_no_file(tmp_path):
-    guided = IntegralLineOfSight.from_model(MARINER, autopilot=Learned())
-    check_controller(guided, MARINER, path_following_task(), n_steps=5)
-    margins = guided.margins
-    assert (margins.gain_margin, margins.phase_margin_deg, margins.lowest_gain) == (
-        np.inf,
-        np.inf,
-        0.0,
-    )
-    with pytest.raises(
-        InputError,
-        match="autopilot: expected a controller of shipgym for a file, got Learned",
-    ):
-        guided.save(tmp_path / "guided.json")
+def test_it_leads_controllers_that_keep_a_heading():
+    for autopilot in (Learned(), IntegralLineOfSight.from_model(MARINER)):
+        with pytest.raises(
+            InputError, match="autopilot: expected a controller that keeps a heading"
+        ):
+            IntegralLineOfSight.from_model(MARINER, autopilot=autopilot)
