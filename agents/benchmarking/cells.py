@@ -108,12 +108,12 @@ def run_cell(entry: Entry, task: BenchmarkTask, options: Options) -> Cell:
         seeds = judging_seeds(on, options.episodes, options.seed)
         sailed = [evaluate(policy, task, seeds, on) for policy in made.policies]
         figures[on] = {}
-        for name in sailed[0].figures:
-            figures[on][name] = np.stack([one.figures[name] for one in sailed])
-        for one in sailed:
-            seconds.append(one.run.seconds_per_action)
-            if one.run.failure:
-                failures.setdefault(on, one.run.failure)
+        for name in sailed[0][0]:
+            figures[on][name] = np.stack([found[name] for found, _ in sailed])
+        for _, run in sailed:
+            seconds.append(run.seconds_per_action)
+            if run.failure:
+                failures.setdefault(on, run.failure)
     return Cell(
         figures=figures,
         failures=failures,

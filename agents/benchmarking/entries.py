@@ -22,14 +22,12 @@ import hashlib
 import inspect
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from importlib.util import find_spec
 from math import inf
 from pathlib import Path
-from symtable import symtable
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -226,7 +224,7 @@ def _short_name(text: str) -> str:
 
 
 def _check_text(text: str) -> None:
-    """Refuse a text that names no controller, function or file; nothing is run."""
+    """Refuse a text that names no controller, function or file."""
     known = known_names()
     if text.endswith(".zip"):
         raise InputError(
@@ -237,46 +235,17 @@ def _check_text(text: str) -> None:
     if text in known or "{task}" in text:
         return
     if names_code(text):
-        if not _module_files(text):
-            raise InputError(
-                f"controllers: expected module:function, got '{text}', whose module"
-                " is not found in this folder or on Python's path"
-            )
-        _check_function(text)
+        _imported(text)
     elif text.endswith(".py"):
         raise InputError(
-            f"controllers: expected FILE.py:function, got '{text}'; name the function"
-            f" or class that makes a controller for a task, of"
-            f" {quoted(_names_in(Path(text)))}"
+            f"controllers: expected {text}:function, which makes a controller for a"
+            f" task, got '{text}'"
         )
     elif not _matching_files(text):
         raise InputError(
             f"controllers: expected one of {quoted(known)}, an existing file of an"
             f" agent, or module:function, got '{text}'.{did_you_mean(text, known)}"
         )
-
-
-def _check_function(text: str) -> None:
-    """Refuse a function that its file does not have; nothing is run."""
-    file, _, name = text.rpartition(":")
-    if file.endswith(".py") and name not in (names := _names_in(Path(file))):
-        raise InputError(
-            f"controllers: expected a function or class of {file}, one of"
-            f" {quoted(names)}, got '{name}'.{did_you_mean(name, names)}"
-        )
-
-
-def _names_in(path: Path) -> tuple[str, ...]:
-    """Names that a Python file defines or imports, without running it."""
-    text = read_bytes(path, "Python file", LARGEST_TENSORS).decode("utf-8", "replace")
-    try:
-        symbols = symtable(text, str(path), "exec").get_symbols()
-    except (SyntaxError, ValueError) as error:
-        line = getattr(error, "lineno", 1)
-        raise InputError(f"{path}, line {line}: expected Python, got {error}") from None
-    return tuple(
-        one.get_name() for one in symbols if one.is_assigned() or one.is_imported()
-    )
 
 
 def _check_object(source: Any, name: str) -> None:
@@ -343,19 +312,31 @@ def _kind(kind: str, task: BenchmarkTask) -> str:
 
 def _imported(text: str) -> Any:
     """Import the function or class that a text names."""
-    module, _, name = text.rpartition(":")
+    holder = _module(text)
+    _, _, name = text.rpartition(":")
+    if not hasattr(holder, name):
+        raise InputError(
+            f"controllers: expected a function or class of {holder.__file__}, got"
+            f" '{name}'.{did_you_mean(name, vars(holder))}"
+        )
+    found = getattr(holder, name)
+    _check_object(found, text)
+    return found
+
+
+def _module(text: str) -> ModuleType:
+    """Import the module or file that a function is named in."""
+    module, _, _ = text.rpartition(":")
+    if module.endswith(".py"):
+        return load_file(Path(module))
     try:
         with working_folder():
-            is_file = module.endswith(".py")
-            holder = load_file(Path(module)) if is_file else import_module(module)
-            found = getattr(holder, name)
-    except (ImportError, AttributeError) as error:
+            return import_module(module)
+    except ImportError as error:
         raise InputError(
             f"controllers: expected module:function, got '{text}', which cannot be"
             f" imported ({error})"
         ) from None
-    _check_object(found, text)
-    return found
 
 
 def _holds(policy: Any, sha256: str, depth: int = 4) -> bool:
@@ -372,7 +353,7 @@ def _holds(policy: Any, sha256: str, depth: int = 4) -> bool:
 def source_files(text: str, task: BenchmarkTask) -> list[Path]:
     """Files from which a text's controllers are made for a task, in order."""
     if names_code(text):
-        return _module_files(text)
+        return [Path(str(_module(text).__file__))]
     kept = {SHIPPED: PRETRAINED / f"{task.environment}-{text}.json"}
     if text.startswith(TUNED):
         kept[text] = suite_file(task.suite, "tuned")
@@ -381,20 +362,6 @@ def source_files(text: str, task: BenchmarkTask) -> list[Path]:
         return [path] if path and path.is_file() else []
     pattern = text.replace("{task}", task.name)
     return _matching_files(pattern)
-
-
-def _module_files(text: str) -> list[Path]:
-    """File of the module that a function is named in; empty where it has none."""
-    module, _, _ = text.rpartition(":")
-    if module.endswith(".py"):
-        return _matching_files(module)
-    with working_folder(), suppress(ImportError):
-        spec = find_spec(module)
-        if spec is None or not spec.has_location:
-            return []
-        origin = str(spec.origin)
-        return [Path(origin)]
-    return []
 
 
 def _matching_files(pattern: str) -> list[Path]:

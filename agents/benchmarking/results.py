@@ -24,14 +24,13 @@ from agents.controllers.interface import model_hash
 from agents.output import check_writable, present
 from agents.suites.suite import BenchmarkTask, Suite
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_fields, check_format
+from shipgym.checks import check_fields, check_format
 from shipgym.drafts import atomic_path
 from shipgym.errors import InputError
 from shipgym.extras import library
 from shipgym.files import make_folder, read_json, write_json
 
 RESULTS, EPISODES, PARTS = "results.json", "episodes.parquet", "parts"
-OPTIONS = "options.json"  # among the parts
 FORMAT, KIND = 4, "shipgym-benchmark"
 FIELDS = (
     "format",
@@ -105,12 +104,8 @@ class BenchmarkResult:
     ) -> Floats:
         """Return a figure of each episode of a set, shape (n_runs, n_episodes).
 
-        There are no runs where the controller could not run the task. Raises InputError
-        for an unknown controller, task or figure.
+        There are no runs where the controller could not run the task.
         """
-        check_choice(controller, self.summary["controllers"], "controller")
-        check_choice(task, self.tasks, "task")
-        check_choice(name, list(self.episodes), "figure")
         rows = self.episodes.query("controller == @controller and task == @task")
         figures: Floats = rows.loc[rows["set"] == on, name].to_numpy(np.float64)
         return figures.reshape(-1, self.summary["options"]["episodes"])
@@ -150,23 +145,12 @@ def _pyarrow() -> Any:
     return library("pyarrow", "benchmark", "the table of episodes needs it")
 
 
-def check_new(
-    folder: Path,
-    resume: bool,
-    suite: Suite,
-    tasks: Sequence[BenchmarkTask],
-    options: Options,
-) -> Path:
-    """Refuse a folder that cannot take results, and note what they are of.
+def check_new(folder: Path, resume: bool) -> Path:
+    """Refuse a folder that cannot take results; one that has some is for `resume`.
 
-    One that holds results is for `resume`, if they are of the same suite, tasks and
-    options. Raises InputError saying what to do.
+    Raises InputError saying what to do.
     """
     _pyarrow()  # a missing extra is reported now, not after the work
-    if folder.exists() and not folder.is_dir():
-        raise InputError(
-            f"{folder}: expected a folder for the results, got a file; choose another"
-        )
     check_writable(folder)
     names = present(folder) if folder.exists() else []
     has_results = any(name in (RESULTS, EPISODES, PARTS) for name in names)
@@ -180,22 +164,6 @@ def check_new(
             f"{folder}: already contains results; continue with --resume (resume=True),"
             " or choose another folder"
         )
-    asked = {
-        "suite": f"{suite.name} ({suite.sha256[:16]})",
-        "tasks": [task.name for task in tasks],
-        **options._asdict(),
-    }
-    note = folder / PARTS / OPTIONS
-    if has_results:
-        known = read_json(note, "file of options", "choose another folder")
-        for name, value in asked.items():
-            if known.get(name) != value:
-                raise InputError(
-                    f"{folder}: {name}: expected that of its results,"
-                    f" {known.get(name)!r}, got {value!r}; choose another folder"
-                )
-    make_folder(note.parent)
-    write_json(asked, note)
     return folder
 
 

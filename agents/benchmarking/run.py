@@ -106,11 +106,11 @@ def benchmark(
 
     if out is None:
         return run(where)
-    folder = check_new(Path(out), resume, the_suite, selected, options)
+    folder = check_new(Path(out), resume)
     with in_use(folder):
         try:
             return run(replace(where, keep=folder / PARTS)).save(folder)
         except InputError:  # nothing that could be kept
             if not resume:
-                shutil.rmtree(folder / PARTS)
+                shutil.rmtree(folder / PARTS, ignore_errors=True)
             raise

@@ -6,19 +6,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from agents.controllers.interface import Policy, check_fits
-from agents.controllers.law import gathered
-from agents.controllers.memory import on_course
 from agents.rollouts.metrics import costs, mean, steering
-from agents.rollouts.rollout import Rollout, rollout
+from agents.rollouts.rollout import rollout
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats, Integers
 from shipgym.checks import check_number, unexpected
 from shipgym.envs.engine import Engine
 from shipgym.models.by_name import ship_of
-from shipgym.tasks.scales import observation_scales
 from shipgym.tasks.task import Task, course_keeping_task
 
 RECORDED = ("psi", "delta", "set_point", *course_keeping_task().info_names)
@@ -177,28 +174,19 @@ def step_response(
     check_fits(controller, asked, first, f"model '{first.name}'")
 
     steps = int(np.ceil(duration / asked.interval(first)))
-    straight = asked.changed(course_change_deg=0.0, episode_steps=steps)
-    engine = Engine(ships, len(ships), straight)
-    step = float(np.radians(step_deg))
-    run = rollout(
-        controller,
-        engine,
-        np.zeros(len(ships), dtype=np.int64),
-        record=RECORDED,
-        show=_NewCourse(engine, step),
+    turn = asked.changed(
+        course_changes_deg=[step_deg],
+        first_course_deg=0.0,
+        change_interval_steps=steps + 1,
+        episode_steps=steps,
     )
-    return _step_responses(run, steps + 1)
-
-
-def _step_responses(run: Rollout, n_samples: int) -> StepResponses:
-    """Responses of a rollout that recorded a step of the set-point."""
-    change = run.states["psi"] - run.states["set_point"]
-    rudder = run.states["delta"]
-    samples = np.arange(n_samples, dtype=np.float64)
+    engine = Engine(ships, len(ships), turn)
+    seeds = np.zeros(len(ships), dtype=np.int64)
+    run = rollout(controller, engine, seeds, record=("psi", "delta"))
     return StepResponses(
-        t=samples * run.dt,
-        heading=_continued(change, n_samples),
-        rudder=_continued(rudder, n_samples),
+        t=run.dt * np.arange(steps + 1.0),
+        heading=_continued(run.histories["psi"], steps + 1),
+        rudder=_continued(run.histories["delta"], steps + 1),
     )
 
 
@@ -206,31 +194,6 @@ def _continued(history: Floats, n_samples: int) -> Floats:
     """History of each ship, shape (n_ships, n_samples), filled up by the last value."""
     missing = n_samples - len(history)
     return np.pad(history, ((0, missing), (0, 0)), mode="edge").T
-
-
-class _NewCourse:
-    """Shows ships a course that is a step, rad, away from the one they keep."""
-
-    def __init__(self, engine: Engine, step: float) -> None:
-        self.engine = engine
-        self.step = step
-        scales = observation_scales(engine.model)
-        self.largest_integral = scales[-1]
-        self.integral = np.zeros(engine.num_envs)
-        self.started = 0.0
-
-    def __call__(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
-        state = self.engine.physical_state()
-        error = self.step - (state["psi"] - state["set_point"])
-        self.integral = gathered(
-            self.integral,
-            error,
-            started=self.started,
-            dt=self.engine.dt,
-            reach=self.largest_integral,
-        )
-        self.started = 1.0
-        return on_course(observations, error, self.integral, self.largest_integral)
 
 
 def _ships(models: ShipModel | Sequence[ShipModel]) -> list[ShipModel]:

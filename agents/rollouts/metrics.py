@@ -8,8 +8,6 @@ Sources: Norrbin 1972, On the added resistance due to steering on a straight cou
 steering).
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -55,7 +53,7 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         charged as if it had lost control then; success is on a path whether its end was
         reached, else whether control was kept.
     """
-    nowhere = np.full(len(run.seeds), np.nan)
+    nowhere = np.full(len(run.costs), np.nan)
     followed = dict.fromkeys(("cross_track_rmse_m", "outside_corridor"), nowhere)
     if _on_path(run.task):
         followed = path_following(run)
@@ -68,7 +66,10 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         violated[f"violated_{name}"] = ratio(intervals, run.steps)
     terminated = lost.astype(np.float64)
     failed = run.failed.astype(np.float64)
-    heel = largest_heel(run)
+    heel = nowhere  # of a ship without roll
+    if "phi" in run.histories:
+        angles = np.abs(during(run, "phi"))
+        heel = np.degrees(angles.max(axis=0, initial=0.0))
     return {
         **costs(run),
         **steering(run),
@@ -85,7 +86,7 @@ def metrics(run: Rollout) -> dict[str, Floats]:
 
 def succeeded(run: Rollout) -> Floats:
     """Flag of each episode, 1 or 0, that says whether it was a success."""
-    if "success" in run.infos:
+    if "success" in run.histories:
         reached: Floats = during(run, "success").max(axis=0, initial=0.0)
         return reached
     lost = run.terminated
@@ -109,7 +110,7 @@ def costs(run: Rollout) -> dict[str, Floats]:
     charged = steps_left * worst_step_cost(run.task)
     parts["cost_end"] += np.where(run.failed, charged, 0.0)
 
-    cost = np.zeros(len(run.seeds))
+    cost = np.zeros(len(run.costs))
     for values in parts.values():
         cost = cost + values
     return {"cost": cost, **parts}
@@ -117,12 +118,12 @@ def costs(run: Rollout) -> dict[str, Floats]:
 
 def steering(run: Rollout) -> dict[str, Floats]:
     """Heading error and rudder activity of each episode, see `metrics`."""
-    heading_rmse = np.full(len(run.seeds), np.nan)
-    if "heading_error" in run.infos:
+    heading_rmse = np.full(len(run.costs), np.nan)
+    if "heading_error" in run.histories:
         heading_rmse = root_mean_square(run, "heading_error")
 
     minutes = run.steps * run.dt / 60.0
-    rudder = run.states["delta"]
+    rudder = run.histories["delta"]
     n_reversals = reversals(rudder, run.sailing)
     moved = np.abs(np.diff(rudder, axis=0))
     moved[~run.sailing] = 0.0
@@ -164,14 +165,6 @@ def reversals(angle: Floats, counts: Flags) -> Floats:
     return number
 
 
-def largest_heel(run: Rollout) -> Floats:
-    """Largest angle of heel to either side, deg; NaN of a ship without roll."""
-    if "phi" not in run.states:
-        return np.full(len(run.seeds), np.nan)
-    heel = np.abs(during(run, "phi"))
-    return np.asarray(np.degrees(heel.max(axis=0, initial=0.0)))
-
-
 def speed_lost(run: Rollout) -> Floats:
     """Service speed less the mean speed through the water, % of service speed."""
     mean_speed = ratio(total(during(run, "u")), run.steps)
@@ -181,8 +174,7 @@ def speed_lost(run: Rollout) -> Floats:
 
 def path_following(run: Rollout) -> dict[str, Floats]:
     """Figures of path following of each episode, see `metrics`."""
-    is_outside = during(run, "in_corridor") == 0.0
-    outside = run.sailing & is_outside
+    outside = run.sailing & (during(run, "in_corridor") == 0.0)
     return {
         "cross_track_rmse_m": root_mean_square(run, "cross_track"),
         "outside_corridor": ratio(total(outside), run.steps),
@@ -194,8 +186,7 @@ def during(run: Rollout, name: str) -> Floats:
 
     It is 0 where the episode was over.
     """
-    histories = run.infos if name in run.infos else run.states
-    return np.where(run.sailing, histories[name][1:], 0.0)
+    return np.where(run.sailing, run.histories[name][1:], 0.0)
 
 
 def mean(run: Rollout, name: str) -> Floats:
@@ -223,21 +214,15 @@ def ratio(above: Floats, below: Floats) -> Floats:
     return quotient
 
 
-class Evaluation(NamedTuple):
-    """Figures of episodes, and the rollout that they are of."""
-
-    figures: dict[str, Floats]  # by name, each of shape (n,)
-    run: Rollout
-
-
 def evaluate(
     policy: Policy, task: BenchmarkTask, seeds: ArrayLike, on: str = "ship"
-) -> Evaluation:
+) -> tuple[dict[str, Floats], Rollout]:
     """Sail episodes of a task, all at once, whatever the policy does.
 
-    See `rollout`, tolerant. `policy`: anything with `predict`; it is given the
-    observations of all ships together; `task`: of a suite; `seeds`: of shape (n,);
-    `on`: which of its sets the episodes are of.
+    Returns their figures, each of shape (n,), and the rollout (tolerant). `policy`:
+    anything with `predict`; it is given the observations of all ships together;
+    `task`: of a suite; `seeds`: of shape (n,); `on`: which of its sets the episodes are
+    of.
     """
     numbers = np.asarray(seeds, dtype=np.int64)
     run = rollout(
@@ -247,4 +232,4 @@ def evaluate(
         record=recorded_for_metrics(task.task),
         tolerant=True,
     )
-    return Evaluation(metrics(run), run)
+    return metrics(run), run

@@ -1,7 +1,7 @@
 """The loop in which a policy steers ships through episodes of a task, side by side."""
 
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,7 +30,6 @@ class Rollout:
         The ship, the first of several.
     dt : float
         Control interval, s.
-    seeds : int array of shape (n,)
     costs : array of shape (n,)
         Sum of the steering costs (`info["cost"]`), up to where the policy failed.
     sailing : bool array of shape (n_steps, n)
@@ -43,22 +42,20 @@ class Rollout:
         How the policy failed first; empty if it did not.
     seconds_per_action : float
         Process time of `predict` over the number of commands it gave, in a batch.
-    states, infos : dict of str to array of shape (n_steps + 1, n)
+    histories : dict of str to array of shape (n_steps + 1, n)
         Physical states and entries of `info` that were recorded, from the beginning on.
     """
 
     task: Task
     model: ShipModel
     dt: float
-    seeds: NDArray[np.int64]
     costs: Floats
     sailing: Flags
     terminated: Flags
     failed: Flags
     failure: str
     seconds_per_action: float
-    states: dict[str, Floats]
-    infos: dict[str, Floats]
+    histories: Histories
 
     @property
     def steps(self) -> Floats:
@@ -71,9 +68,8 @@ def rollout(
     engine: Engine,
     seeds: ArrayLike,
     *,
-    record: bool | Collection[str] = False,
+    record: Collection[str] = (),
     tolerant: bool = False,
-    show: Callable[[NDArray[np.float32]], NDArray[np.float32]] | None = None,
 ) -> Rollout:
     """Steer the ships of an engine through one episode each.
 
@@ -88,15 +84,12 @@ def rollout(
         With a lane for each seed.
     seeds : array-like of int, shape (n,)
         Of the episodes.
-    record : bool or collection of str
-        Names of physical states and of entries of `info` to record; True for all.
+    record : collection of str
+        Names of physical states and of entries of `info` to record.
     tolerant : bool
         Whether a policy that raises an error, or gives NaN or no command for each ship,
         ends the episodes that it fails in and the others go on; otherwise that is an
         error.
-    show : callable, optional
-        What the policy is shown in place of the observations; asked before each
-        command.
     """
     n = engine.num_envs
     helmsman = _Helmsman(policy, tolerant)
@@ -107,8 +100,9 @@ def rollout(
     costs = np.zeros(n)
     sailed: list[Flags] = []
     while sailing.any():
-        seen = observations if show is None else show(observations)
-        commands, missing = helmsman.steer(seen, starts, sailing, len(engine.command))
+        commands, missing = helmsman.steer(
+            observations, starts, sailing, len(engine.command)
+        )
         failed = failed | missing
         sailing = sailing & ~missing
         if not sailing.any():  # the policy has failed in all episodes
@@ -120,49 +114,30 @@ def rollout(
         looks.append(_look(engine, record))
         sailing = sailing & ~(terminated | truncated)
         starts = np.zeros_like(starts)
-    ends = {"costs": costs, "terminated": ended, "failed": failed}
-    return _rollout(engine, seeds, helmsman, sailed, looks, **ends)
-
-
-def _rollout(
-    engine: Engine,
-    seeds: ArrayLike,
-    helmsman: "_Helmsman",
-    sailed: list[Flags],
-    looks: list[tuple[Histories, Histories]],
-    **ends: Any,
-) -> Rollout:
-    """All that was noted of episodes."""
-    states, infos = zip(*looks, strict=True)
     return Rollout(
         task=engine.task,
         model=engine.model,
         dt=engine.dt,
-        seeds=np.asarray(seeds),
-        sailing=np.array(sailed, dtype=np.bool_).reshape(-1, engine.num_envs),
+        costs=costs,
+        sailing=np.array(sailed, dtype=np.bool_).reshape(-1, n),
+        terminated=ended,
+        failed=failed,
         failure=helmsman.failure,
         seconds_per_action=helmsman.seconds / max(helmsman.n_commands, 1),
-        states=_stacked(states),
-        infos=_stacked(infos),
-        **ends,
+        histories={name: np.array([one[name] for one in looks]) for name in looks[0]},
     )
 
 
-def _look(
-    engine: Engine, record: bool | Collection[str]
-) -> tuple[Histories, Histories]:
+def _look(engine: Engine, recorded: Collection[str]) -> Histories:
     """Physical states and entries of `info` that are recorded, now."""
-    if not record:
-        return {}, {}
-    states = {}
-    for name, values in engine.physical_state().items():
-        if record is True or name in record:
-            states[name] = np.array(values)
-    infos = {}
+    if not recorded:
+        return {}
+    states = engine.physical_state()
+    found = {name: np.array(states[name]) for name in recorded if name in states}
     for name in engine.task.info_names:
-        if record is True or name in record:
-            infos[name] = engine.info(name).copy()
-    return states, infos
+        if name in recorded:
+            found[name] = engine.info(name).copy()
+    return found
 
 
 def episode_costs(policy: Policy, engine: Engine, seeds: NDArray[np.int64]) -> Floats:
@@ -243,8 +218,3 @@ def _no_number(values: NDArray[np.float32], missing: Flags, sailing: Flags) -> s
         f" number for {missing.sum()} of {sailing.sum()} ships; look for a division by"
         " zero in the controller"
     )
-
-
-def _stacked(records: Sequence[Histories]) -> Histories:
-    """Histories by name, each of shape (n_records, n)."""
-    return {name: np.array([one[name] for one in records]) for name in records[0]}

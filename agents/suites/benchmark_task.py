@@ -102,18 +102,15 @@ class BenchmarkTask:
 
         Raises InputError, also for an unknown model, ship or option.
         """
-        designed = self.design.observed()
-        steered = self.scenario("ship").observed()
-        for on_model, on_ship in zip(designed, steered, strict=True):
-            same_name = on_model.name == on_ship.name
-            same_scale = on_model.scale == on_ship.scale
-            if not (same_name and same_scale):
-                raise InputError(
-                    f"task '{self.name}': ship: expected the particulars of"
-                    f" '{self.model}', got '{self.true_ship}', whose '{on_ship.name}'"
-                    f" is shown in units of {on_ship.scale:g} instead of"
-                    f" {on_model.scale:g}"
-                )
+        designed, steered = (
+            [(shown.name, shown.scale) for shown in scenario.observed()]
+            for scenario in (self.design, self.scenario("ship"))
+        )
+        if designed != steered:
+            raise InputError(
+                f"task '{self.name}': ship: expected the particulars of '{self.model}',"
+                f" got '{self.true_ship}', whose observations are shown in other units"
+            )
 
     @property
     def env_id(self) -> str:

@@ -6,47 +6,20 @@ that exceeds one is ranked after those that do not.
 """
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 from shipgym.checks import check_keys, check_number, check_table
 
-
-class LimitedFigure(NamedTuple):
-    """A figure of `agents.rollouts.metrics` that may be limited."""
-
-    title: str
-    statistic: str  # over episodes: "mean" or "p95"
-    source: str
-
-
-#: Figures that a suite may limit, and where limits of them are taken from.
-LIMITED_FIGURES: Mapping[str, LimitedFigure] = {
-    "rudder_reversals_min": LimitedFigure(
-        "rudder reversals, 1/min",
-        "mean",
-        "operators' practice: an autopilot in economy mode in calm water gives an order"
-        " every half a minute or less; in waves none faster than they come",
-    ),
-    "rudder_travel_deg_min": LimitedFigure(
-        "rudder travel, deg/min",
-        "mean",
-        "operators' practice: wear of the steering gear, in proportion to its travel",
-    ),
-    "heel_deg": LimitedFigure(
-        "largest heel, deg",
-        "p95",
-        "2008 IS Code, part A, 3.1.2: heel on account of turning at most 10 deg",
-    ),
-    "outside_corridor": LimitedFigure(
-        "time outside the corridor",
-        "mean",
-        "IEC 62065: an alarm is due when the cross-track limit is exceeded",
-    ),
-    "speed_lost_percent": LimitedFigure(
-        "speed lost, %",
-        "mean",
-        "operators' practice: loss of speed by steering",
-    ),
+#: Figures of `agents.rollouts.metrics` that a suite may limit, and the statistic over
+#: episodes that counts. Of heel: 2008 IS Code, part A, 3.1.2 (at most 10 deg by
+#: turning); of the corridor: the cross-track alarm of IEC 62065; the others:
+#: operators' practice (economy mode, wear of the steering gear).
+LIMITED_FIGURES = {
+    "rudder_reversals_min": "mean",
+    "rudder_travel_deg_min": "mean",
+    "heel_deg": "p95",
+    "outside_corridor": "mean",
+    "speed_lost_percent": "mean",
 }
 
 
@@ -72,8 +45,7 @@ def exceeded(
     """
     beyond = {}
     for name, largest in limits.items():
-        statistic = LIMITED_FIGURES[name].statistic
-        value = metrics.get(name, {}).get(statistic)
+        value = metrics.get(name, {}).get(LIMITED_FIGURES[name])
         if value is not None and value > largest:
             beyond[name] = value
     return beyond

@@ -139,9 +139,7 @@ def find_task(
 
     Raises InputError for an unknown name, with the nearest, or as `load_suite`.
     """
-    known = {task.name: task for task in load_suite(suite, allow_code).tasks}
-    check_choice(name, known, "task")
-    return known[name].design_task
+    return load_suite(suite, allow_code).task(name).design_task
 
 
 def suite_file(suite: str, what: str) -> Path:
@@ -165,12 +163,7 @@ def load_tuned(suite: str) -> dict[str, dict[str, Any]]:
     path = suite_file(suite, "tuned")
     remedy = "make it again with scripts/tune_controllers.py"
     content = read_json(path, "file of tuned settings", remedy)
-    tasks = check_table(content.get("tasks"), f"{path}: tasks")
-    settings = {}
-    for name, controllers in tasks.items():
-        table = check_table(controllers, f"{path}: tasks.{name}")
-        settings[name] = dict(table)
-    return settings
+    return dict(check_table(content.get("tasks"), f"{path}: tasks"))
 
 
 def parse_suite(

@@ -91,9 +91,9 @@ def keep_track(guide: Controller, models: Sequence[ShipModel]) -> Track:
     )
     run = rollout(guide, engine, seeds, record=recorded)
 
-    x = _of_first(run, run.states["x"])
-    y = _of_first(run, run.states["y"])
-    cross_track = _of_first(run, run.infos["cross_track"])
+    x = _of_first(run, run.histories["x"])
+    y = _of_first(run, run.histories["y"])
+    cross_track = _of_first(run, run.histories["cross_track"])
     return Track(
         key=guide.kind,
         controller=guide,
@@ -116,9 +116,9 @@ def _largest_error(run: Rollout) -> Floats:
     """Largest cross-track error of each ship after the start, m, shape (n,)."""
     settled_lengths = 6.0  # way after the start that does not count
     settled = settled_lengths * run.model.particulars["length"]
-    made_good = run.infos["distance_made_good"][1:]
+    made_good = run.histories["distance_made_good"][1:]
     counts = run.sailing & (made_good > settled)
 
-    off_track = np.abs(run.infos["cross_track"][1:])
+    off_track = np.abs(run.histories["cross_track"][1:])
     counted = np.where(counts, off_track, 0.0)
     return np.asarray(counted.max(axis=0))

@@ -11,7 +11,7 @@ from identification.judging.fit import Fit
 from identification.judging.warnings import EQUATIONS
 from shipgym import Trial
 from shipgym.manoeuvres.quantiles import NORMAL_95
-from shipgym.plots import Panel, axis, graph_objects, line, panels, points
+from shipgym.plots import Panel, axis, line, panels, points
 from shipgym.plots.style import LIMIT, MUTED, Figure
 from shipgym.plots.trials import history_panel, path_panel
 
@@ -65,7 +65,7 @@ def residual_figure(fit: Fit) -> Figure:
     shown = []
     for q, error in residuals(fit.estimators, fit.samples).items():
         own = autocorrelation(error[rows], 24)
-        traces = [graph_objects().Bar(x=np.arange(1, 25), y=own, name=q)]
+        traces = [{"type": "bar", "x": np.arange(1, 25), "y": own, "name": q}]
         for level in (-bound, bound):
             ends = [level] * 2
             traces.append(line([0.5, 24.5], ends, "95 % of white noise", LIMIT, 1.2))
@@ -117,8 +117,7 @@ def overview_figure(fit: Fit) -> Figure | None:
         first_deg = np.degrees(trial["psi"][0])
         headings = history_panel(_runs(trial, fit.predictions[trial.name]), "psi")
         for trace in headings.traces:
-            trace.y = np.asarray(trace.y) - first_deg
-            lines.append(trace)
+            lines.append({**trace, "y": trace["y"] - first_deg})
         shown.append(Panel(lines, "time, s", "deg", PurePath(trial.name).name))
     return panels(shown, 230 * ((len(shown) + 1) // 2) + 80, columns=2, outer=True)
 

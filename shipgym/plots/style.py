@@ -37,7 +37,8 @@ def _plotly(module: str) -> Any:
 class Panel(NamedTuple):
     """A part of a figure."""
 
-    traces: list[Any]  # lines and points of one name are one entry of the legend
+    #: as plotly takes them; lines and points of one name are one entry of the legend
+    traces: list[dict[str, Any]]
     x: Axis = ""
     y: Axis = ""
     title: str = ""
@@ -127,13 +128,11 @@ def _placed_traces(shown: Sequence[Panel]) -> list[dict[str, Any]]:
     for k, panel in enumerate(shown):
         number = _axis_number(k)
         for trace in panel.traces:
-            name = trace.legendgroup
-            if name is not None and trace.showlegend is not False:
-                trace.showlegend = name not in names
+            drawn = {**trace, "xaxis": f"x{number}", "yaxis": f"y{number}"}
+            name = trace.get("legendgroup")
+            if name is not None and trace.get("showlegend", True):
+                drawn["showlegend"] = name not in names
                 names.add(name)
-            drawn = trace.to_plotly_json()
-            drawn["xaxis"] = f"x{number}"
-            drawn["yaxis"] = f"y{number}"
             traces.append(drawn)
     return traces
 
@@ -216,22 +215,23 @@ def line(
     width: float = 1.9,
     mode: str = "lines",
     **more: Any,
-) -> Any:
+) -> dict[str, Any]:
     """A line; `more` are settings of plotly's `Scatter`."""
-    return graph_objects().Scatter(
-        x=compact(x),
-        y=compact(y),
-        name=name,
-        legendgroup=name,
-        mode=mode,
-        line={"color": colour, "width": width},
+    return {
+        "type": "scatter",
+        "x": compact(x),
+        "y": compact(y),
+        "name": name,
+        "legendgroup": name,
+        "mode": mode,
+        "line": {"color": colour, "width": width},
         **more,
-    )
+    }
 
 
 def points(
     x: ArrayLike, y: ArrayLike, name: str, colour: str, size: float = 7.0, **more: Any
-) -> Any:
+) -> dict[str, Any]:
     """Markers; `more` are settings of plotly's `Scatter`."""
     return line(
         x,

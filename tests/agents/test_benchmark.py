@@ -91,12 +91,6 @@ def test_results_are_those_of_any_worker_and_read_back_as_they_were_written(
 def test_what_was_run_is_kept_and_not_run_again(copy, suite):
     with pytest.raises(InputError, match=r"already contains results.*--resume"):
         benchmark("pid,lq", suite, "calm", copy, episodes=N)
-    for other in ({"episodes": 2}, {"seed": 1}, {"runs": 2}):
-        ((name, value),) = other.items()
-        said = f"{name}: expected that of its results, .*, got {value}"
-        again = {"episodes": N, "resume": True, **other}
-        with pytest.raises(InputError, match=said):
-            benchmark("pid,lq", suite, "calm", copy, **again)
     (part,) = [
         one for one in (copy / "parts").iterdir() if '\\"pid\\"' in one.read_text()
     ]
@@ -214,7 +208,7 @@ def test_those_beyond_a_limit_come_after_those_within(tmp_path):
         ("pid,pid", "got 'pid' twice"),
         ("x=nobody.json", "got 'nobody.json'"),
         ("model.zip", r"LearnedPolicy\.from_sb3\(agent\)\.save\('agent\.json'\)"),
-        ("no_such_module:make", "'no_such_module:make', whose module is not found"),
+        ("no_such_module:make", "'no_such_module:make', which cannot be imported"),
         ({"a": 3}, "'a': expected a controller.* got 3"),
         ({"a": [LQ.from_model(MARINER), 3]}, "'a': expected a controller.* got 3"),
         ([], "controllers: expected at least one, got none"),
@@ -246,14 +240,14 @@ def test_a_function_in_a_file_makes_a_controller_and_its_fault_has_a_line(
     result = benchmark("my_pilots.py:factory", suite, "calm", episodes=2)
     assert "my_pilots.py, line 3)" in result.failures[0]
     for given, said in (
-        ("my_pilots.py", "expected FILE.py:function.* 'Pilot', 'factory'"),
+        ("my_pilots.py", "expected my_pilots.py:function"),
         ("my_pilots.py:factry", "got 'factry'. Did you mean 'factory'"),
-        ("no_pilots.py:factory", "whose module is not found"),
+        ("no_pilots.py:factory", "expected a Python file, got no such file"),
     ):
         with pytest.raises(InputError, match=said):
             read_entries(given)
     file.write_text("def factory(task:\n", "utf-8")
-    with pytest.raises(InputError, match=r"my_pilots\.py, line 1: expected Python"):
+    with pytest.raises(InputError, match=r"my_pilots\.py, line 1: cannot be exec"):
         read_entries("my_pilots.py:factory")
 
 

@@ -45,11 +45,11 @@ def test_figures_of_steering_and_of_paths_by_hand():
         sailing=sailing,
         steps=sailing.sum(axis=0).astype(float),
         dt=3.0,
-        seeds=SEEDS[:2],
+        costs=np.zeros(2),
         task=PATH.task,
     )
-    run.states = {"delta": np.radians([[0, 0], [2, 1], [-2, 1], [1, 9], [1, 0]])}
-    run.infos = {
+    run.histories = {
+        "delta": np.radians([[0, 0], [2, 1], [-2, 1], [1, 9], [1, 0]]),
         "heading_error": np.radians([[9, 9], [3, -1], [4, 1], [0, 9], [0, 9]]),
         "cross_track": np.array(
             [[9.0, 9.0], [3.0, -1.0], [-4.0, 1.0], [0.0, 9.0], [0.0, 9.0]]
@@ -89,23 +89,23 @@ FAILURES = {
 
 @pytest.mark.parametrize("how", FAILURES)
 def test_a_controller_that_fails_is_charged_for_the_rest_and_the_others_go_on(how):
-    sails = evaluate(steady(0.0), KEEPING, SEEDS[:3])
-    found = evaluate(Steers(FAILURES[how]), KEEPING, SEEDS[:3])
+    sails, _ = evaluate(steady(0.0), KEEPING, SEEDS[:3])
+    found, run = evaluate(Steers(FAILURES[how]), KEEPING, SEEDS[:3])
     concerned = (
         np.array([False, True, False])
         if how == "nan for one ship"
         else np.ones(3, dtype=np.bool_)
     )
-    assert (found.figures["failed"] > 0.0).tolist() == concerned.tolist()
-    assert "step 50" in found.run.failure
-    steps = found.run.steps
+    assert (found["failed"] > 0.0).tolist() == concerned.tolist()
+    assert "step 50" in run.failure
+    steps = run.steps
     assert (steps[concerned] == 50.0).all()
     np.testing.assert_allclose(
-        found.figures["cost_end"][concerned],
+        found["cost_end"][concerned],
         (250 - 50) * worst_step_cost(KEEPING.task),
         rtol=1e-12,
     )
-    for name, values in found.figures.items():
+    for name, values in found.items():
         np.testing.assert_array_equal(
-            values[~concerned], sails.figures[name][~concerned], err_msg=name
+            values[~concerned], sails[name][~concerned], err_msg=name
         )

@@ -50,8 +50,6 @@ def test_the_page_holds_its_numbers_and_where_they_are_from(result, page):
         "a &lt;b&gt;lazy one",
         "none could not run calm, turns: ",
         "3 controllers in 2 of 2 tasks, 5 episodes of each set",
-        "pid,a &lt;b&gt;lazy one=...,none=...",
-        "--suite small.toml --episodes 5 --out results",
         "rudder reversals, 1/min",
     ):
         assert one in text

@@ -61,11 +61,13 @@ def episode(**changes):
 
 
 def plots_of(page):
-    """Data of the figures that the page draws, by their names."""
+    """Data and layout of the figures that the page draws, by their names."""
     read = json.JSONDecoder().raw_decode
     found = {}
     for start in re.finditer(r'Plotly.newPlot\("plot-(\w+)-figure",', page):
-        found[start[1]], _ = read(page, start.end())
+        data, end = read(page, start.end())
+        layout, _ = read(page, end + 1)
+        found[start[1]] = data, layout
     return found
 
 
@@ -89,13 +91,13 @@ def shown(tmp_path):
 
 
 def histories(page):
-    """First and last value of each line of the histories, by panel, in its order."""
-    panels = re.findall(r'"text":"([^"]+)","x":', page)
-    found = {panel: [] for panel in panels}
-    for trace in plots_of(page)["histories"]:
-        panel = panels[int(trace["yaxis"][1:] or 1) - 1]
+    """First and last value of each line of the histories, by the title of its axis."""
+    found = {}
+    data, layout = plots_of(page)["histories"]
+    for trace in data:
+        title = layout["yaxis" + trace["yaxis"][1:]]["title"]["text"]
         y = values(trace["y"])
-        found[panel].append((y[0], y[-1]))
+        found.setdefault(title, []).append((y[0], y[-1]))
     return found
 
 
@@ -107,23 +109,20 @@ def test_a_page_shows_what_was_recorded_in_the_units_that_are_read(shown):
     turned = np.degrees(0.002 * END)
     expected = {
         "heading, deg": (0.0, turned),
-        "cross-track error, m": (20.0, 20.0),
         "rudder, deg": (0.0, 10.0 * np.sin(END / 20.0)),
-        "speed through water, m/s": (5.0, 5.0),
+        "rudder order, deg": (10.0 * np.sin(DT / 20.0), 10.0 * np.sin(END / 20.0)),
+        "surge, m/s": (5.0, 5.0),
         "yaw rate, deg/s": (np.degrees(0.002), np.degrees(0.002)),
         "heel, deg": (0.0, turned),
-        "shaft speed, 1/min": (60.0, 90.0),
-        "wind speed, m/s": (8.0, 8.0),
-        "wind from, deg": (90.0, 90.0),
-        "current to the east, m/s": (-0.5, -0.5),
+        "shaft, rev/s": (1.0, 1.5),
+        "wind, m/s": (8.0, 8.0),
+        "cross-track error, m": (20.0, 20.0),
         "reward so far": (0.0, -0.5 * STEPS),
-        "cross track, reward so far": (0.0, -0.4 * STEPS),
-        "rudder, reward so far": (0.0, -0.1 * STEPS),
     }
-    assert list(found) == list(expected)
+    assert found.keys() == expected.keys()
     for panel, ends in expected.items():
         np.testing.assert_allclose(found[panel], ends, rtol=1e-5, atol=1e-6)
-    assert len(histories(page)["rudder, deg"]) == 2  # with its order
+    assert histories(page)["heading, deg"][1][0] == pytest.approx(np.degrees(0.1))
     assert str(2**80) in page
     assert "time limit" in page
 
@@ -131,17 +130,17 @@ def test_a_page_shows_what_was_recorded_in_the_units_that_are_read(shown):
 def test_the_ship_moves_through_the_frames_to_its_end(shown):
     known = episode()
     page = shown(
-        states={name: values[:2] for name, values in known.states.items()},
+        states={name: values[:3] for name, values in known.states.items()},
         commands={},
         reward_parts={},
         info={},
-        rewards=known.rewards[:1],
-        actions=known.actions[:1],
+        rewards=known.rewards[:2],
+        actions=known.actions[:2],
     )
     start = page.index('Plotly.addFrames("plot-chart-figure",')
     frames, _ = json.JSONDecoder().raw_decode(page, page.index("[", start))
-    assert [frames[0]["name"], frames[-1]["name"]] == ["0.0", f"{DT:.1f}"]
-    for frame, heading, north in ((frames[0], 0.0, 0.0), (frames[-1], 0.01, 25.0)):
+    assert [frames[0]["name"], frames[-1]["name"]] == ["0.0", f"{2 * DT:.1f}"]
+    for frame, heading, north in ((frames[0], 0.0, 0.0), (frames[-1], 0.02, 50.0)):
         (hull,) = frame["data"]
         bow = 20.0 + 50.0 * np.sin(heading), north + 50.0 * np.cos(heading)
         assert (hull["x"][0], hull["y"][0]) == pytest.approx(bow, abs=0.01)

@@ -76,7 +76,7 @@ def test_a_zigzag_is_drawn_as_the_change_of_heading_with_its_rudder():
 
 
 def test_without_plotly_the_message_says_what_to_install(monkeypatch, circle):
-    monkeypatch.setitem(__import__("sys").modules, "plotly.graph_objects", None)
+    monkeypatch.setitem(__import__("sys").modules, "plotly.subplots", None)
     with pytest.raises(InputError, match=r"pip install 'shipgym\[report\]'"):
         path_figure({"turn": circle})
 
