@@ -10,10 +10,7 @@ from typer import Option
 
 from agents.cli.command import (
     FAILED,
-    Address,
-    EngineName,
     ShipFileArgument,
-    Workers,
     fail,
 )
 from agents.cli.identify_options import with_identify_options
@@ -61,9 +58,6 @@ def autopilot_command(
             help="Tune each design for this many seconds of processor time.",
         ),
     ] = 0.0,
-    engine: EngineName = "local",
-    workers: Workers = 1,
-    address: Address = None,
 ) -> None:
     """Go from trials to a report on autopilots.
 
@@ -75,7 +69,6 @@ def autopilot_command(
     the report then says why.
     """
     from agents.cli.terminal import progress_bars
-    from agents.jobs import JobEngine
     from agents.verification.chain import build_autopilot
     from agents.verification.verify import DESIGNS
 
@@ -93,7 +86,6 @@ def autopilot_command(
             designs=designs,
             tune_seconds=tune,
             progress=on_progress,
-            where=JobEngine(engine, workers, address),
         )
     print_autopilot(result, out / "report.html", draws)
 
@@ -134,13 +126,12 @@ def _print_verification(
     from agents.cli.terminal import console, say
     from identification.judging.warnings import held_out_error
 
-    manoeuvres = verification.manoeuvres
     say(held_out_error(result.identification))
     console.print(tables.prediction_table(result.identification))
     console.print()
-    console.print(tables.criteria_table(manoeuvres.criteria))
-    say(*tables.criteria_notes(manoeuvres.criteria))
-    console.print(f"\nunstable draws: {int(manoeuvres.unstable.sum())} of {draws}\n")
+    console.print(tables.criteria_table(verification.criteria))
+    say(*tables.criteria_notes(verification.criteria))
+    console.print(f"\nunstable draws: {int(verification.unstable.sum())} of {draws}\n")
     console.print(tables.ranking_table(result))
     console.print()
     for name, track in result.metrics["tracks"].items():

@@ -23,9 +23,6 @@ ShipFileArgument = Annotated[
 EngineName = Annotated[
     str, Option("--engine", help="Where jobs run: local (this computer) or ray.")
 ]
-Workers = Annotated[
-    int, Option(min=1, help="Jobs at a time; the results do not depend on it.")
-]
 Address = Annotated[
     str | None,
     Option(

@@ -14,7 +14,6 @@ from agents.controllers.controller import Controller
 from agents.controllers.interface import check_fits
 from agents.controllers.registry import controller_class, controller_kinds
 from agents.identifying import identification_settings, trials_of
-from agents.jobs import HERE, EngineError, JobEngine
 from agents.output import whole_folder
 from agents.verification.refusal import (
     refused_designs,
@@ -58,7 +57,6 @@ def build_autopilot(
     designs: Sequence[str] = DESIGNS,
     tune_seconds: float = 0.0,
     progress: Progress | None = None,
-    where: JobEngine = HERE,
 ) -> AutopilotResult:
     """Identify a ship from trials, design and verify autopilots, write the report.
 
@@ -73,8 +71,7 @@ def build_autopilot(
     or names of pretrained ones (`load_agent`); `designs`: kinds of controller to
     design, of which those that lead another one keep to a track; `tune_seconds`: of
     processor for a search of each design's settings, 0 for none; `progress`: called as
-    the work goes on; `where`: where the models drawn are worked on; the
-    results are the same. Raises InputError for anything wrong with the files or
+    the work goes on. Raises InputError for anything wrong with the files or
     arguments; nothing is written then.
     """
     check_number(draws, "draws", at_least=2)
@@ -94,7 +91,6 @@ def build_autopilot(
             draws=int(draws),
             seed=int(seed),
             tell=tell,
-            where=where,
             guests=[guest for _, guest in guests],
             designs=designs,
             tune_seconds=tune_seconds,
@@ -177,8 +173,6 @@ def examined(
     check_guests(guests, fit.model)
     try:
         found = verified()
-    except EngineError:
-        raise
     except (UnstableModelError, InputError) as error:
         # the user's input was right, the model is not
         return result(str(error))
@@ -220,9 +214,8 @@ def or_simpler(fitted: Callable[..., AutopilotResult]) -> AutopilotResult:
 
 def _measured(found: Verification, fit: IdentificationResult) -> Verification:
     """A verification with what the trials measured."""
-    manoeuvres = found.manoeuvres
-    criteria = with_measured(manoeuvres.criteria, measured_by(fit.model, fit.trials))
-    return replace(found, manoeuvres=replace(manoeuvres, criteria=criteria))
+    measured = measured_by(fit.model, fit.trials)
+    return replace(found, criteria=with_measured(found.criteria, measured))
 
 
 def check_guests(guests: Sequence[tuple[str, Agent]], model: ShipModel) -> None:

@@ -103,16 +103,16 @@ def is_certain(found: Verification) -> bool:
 
     A model is lost that runs away in a manoeuvre, or under the best autopilot.
     """
-    criteria = found.manoeuvres.criteria.values()
+    criteria = found.criteria.values()
     lost = found.pilots[0].episodes.terminated
     is_met = all(criterion.passed for criterion in criteria)
-    return is_met and not found.manoeuvres.unstable.any() and not lost.any()
+    return is_met and not found.unstable.any() and not lost.any()
 
 
 def headline(found: Verification) -> str:
     """The verdict in two or three sentences."""
-    sentences = _criteria_sentences(found.manoeuvres.criteria)
-    unstable = int(found.manoeuvres.unstable.sum())
+    sentences = _criteria_sentences(found.criteria)
+    unstable = int(found.unstable.sum())
     if unstable:
         sentences.append(
             f"{unstable} of {found.draws} models drawn run away in a manoeuvre."
@@ -192,10 +192,9 @@ def result_figures(
         step = pilot.step
         responses[pilot.name] = (step.heading, step.rudder)
     t = found.pilots[0].step.t
-    manoeuvres = found.manoeuvres
     shown = {
         **trial_figures(fit),
-        "criteria": figures.criteria_figure(manoeuvres.criteria),
+        "criteria": figures.criteria_figure(found.criteria),
         "steps": figures.steps_figure(t, responses, STEP_DEG),
     }
     if found.tracks:

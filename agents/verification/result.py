@@ -9,10 +9,10 @@ import numpy as np
 
 from agents.controllers.controller import Controller
 from agents.rollouts.course_keeping import Episodes, StepResponses
-from agents.verification.monte_carlo import ManoeuvreUncertainty
 from agents.verification.tracks import Track
 from identification import IdentificationResult
 from shipgym.arrays import Flags, finite
+from shipgym.manoeuvres import Criterion
 from shipgym.manoeuvres.quantiles import upper_95
 from shipgym.models import ShipModel
 from shipgym.models.linear import Nomoto
@@ -55,8 +55,10 @@ class Verification:
 
     draws: int  # number of models drawn from the coefficient covariance
     seed: int  # of the draw and of the episodes
-    #: indices and IMO criteria of the model and its draws
-    manoeuvres: ManoeuvreUncertainty
+    #: IMO criteria that her equations allow, each with its interval over the draws
+    criteria: dict[str, Criterion]
+    #: draws that run away in one of their manoeuvres, shape (n_draws,)
+    unstable: Flags
     #: draws that do not hold a straight course with the rudder held, shape (n_draws,)
     course_unstable: Flags
     nomoto: Nomoto  # of the identified model
@@ -127,17 +129,18 @@ class AutopilotResult:
 
 def verification_metrics(found: Verification) -> dict[str, Any]:
     """Contents of metrics.json about a verification."""
-    criteria = found.manoeuvres.criteria
     return {
         "draws": {
             "count": found.draws,
             "seed": found.seed,
-            "unstable": int(found.manoeuvres.unstable.sum()),
+            "unstable": int(found.unstable.sum()),
             "course_unstable": int(found.course_unstable.sum()),
             "left_out": found.left_out,
         },
         "nomoto": _finite(asdict(found.nomoto)),
-        "imo": {name: criterion.to_dict() for name, criterion in criteria.items()},
+        "imo": {
+            name: criterion.to_dict() for name, criterion in found.criteria.items()
+        },
         "controllers": {pilot.key: pilot_metrics(pilot) for pilot in found.pilots},
         "ranking": [pilot.key for pilot in found.pilots],
         "refused": found.refused,

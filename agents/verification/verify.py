@@ -12,11 +12,9 @@ import numpy as np
 
 from agents.controllers.controller import Controller
 from agents.controllers.registry import controller_class
-from agents.jobs import HERE, JobEngine
 from agents.rollouts.course_keeping import step_response
 from agents.training.controller_space import searched_kinds
 from agents.verification.closed_loop import ClosedLoop, Held, lost_tracks
-from agents.verification.monte_carlo import MonteCarlo, monte_carlo
 from agents.verification.result import STEP_DEG, Pilot, Verification
 from agents.verification.tracks import track_task
 from agents.verification.tuned import Tuned, no_worse, tuned_design
@@ -24,9 +22,10 @@ from identification.progress import Progress
 from shipgym.arrays import Flags
 from shipgym.checks import quoted
 from shipgym.errors import InputError
+from shipgym.manoeuvres.imo import assess_draws
 from shipgym.manoeuvres.quantiles import upper_95
 from shipgym.models import ShipModel
-from shipgym.models.linear import nomoto
+from shipgym.models.linear import is_course_stable, nomoto
 from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
@@ -40,7 +39,6 @@ def verify(
     draws: int,
     seed: int,
     tell: Progress = lambda *_: None,
-    where: JobEngine = HERE,
     guests: Sequence[Agent] = (),
     designs: Sequence[str] = DESIGNS,
     trials: Sequence[Trial] = (),
@@ -49,44 +47,30 @@ def verify(
     """Design autopilots on a model and run them over models drawn from its covariance.
 
     `model`: with a covariance;
-    `draws`, `seed`, `where`, `designs`: see `build_autopilot`; `tell`: called with the
+    `draws`, `seed`, `designs`: see `build_autopilot`; `tell`: called with the
     progress; `guests`: further autopilots; `trials`: that the ship was put through: a
     model drawn that runs away in one of them does not count; `tune_seconds`: of
-    processor for the settings of each design, 0 for none. Raises UnstableModelError if
-    the model itself runs away; InputError if no autopilot can be designed on it.
+    processor for the settings of each design, 0 for none. Raises InputError if no
+    autopilot can be designed on it.
     """
     tell("models drawn", 0, draws)
     designed = design_autopilots(model, designs, tune_seconds, tell)
-    tuned = [one.controller for one in designed.tuned.values() if not one.leads]
-    found = monte_carlo(
-        [*designed.controllers, *tuned],
-        model,
-        draws,
-        seed,
-        where=where,
-        progress=lambda done: tell("models drawn", done, draws),
-    )
     loop = ClosedLoop(
         model=model,
-        draws=found.draws,
+        draws=model.sample(draws, seed),
         seeds=seed + np.arange(draws),
         trials=trials,
     )
-    return judged(designed, found, loop, guests, tell)
+    criteria = assess_draws(
+        model, loop.draws, lambda done: tell("models drawn", done, draws)
+    )
+    drawn = {name: one.drawn for name, one in criteria.items() if one.drawn is not None}
+    unstable = np.any([one.ran_away for one in drawn.values()], axis=0)
+    stable = [loop.draws[number] for number in np.flatnonzero(~unstable).tolist()]
 
-
-def judged(
-    designed: Designed,
-    found: MonteCarlo,
-    loop: ClosedLoop,
-    guests: Sequence[Agent],
-    tell: Progress,
-) -> Verification:
-    """Findings on designs, and further autopilots, that sailed the models drawn."""
     told: dict[str, str] = {}
     courses = [
-        chosen(one, found.episodes_of, designed.tuned, told)
-        for one in designed.controllers
+        chosen(one, loop.sail, designed.tuned, told) for one in designed.controllers
     ]
     guides = [chosen(one, loop.led, designed.tuned, told) for one in designed.guides]
     for held in courses:
@@ -94,19 +78,28 @@ def judged(
     for held in guides:
         loop.look_at(lost_tracks(held.outcome))
     steered = [*courses, *[Held(guest, loop.sail(guest)) for guest in guests]]
-    pilots = run_pilots(steered, [loop.model, *found.stable_draws], tell)
+    pilots = run_pilots(steered, [model, *stable], tell)
     return Verification(
-        draws=len(loop.draws),
-        seed=int(loop.seeds[0]),
-        manoeuvres=found.manoeuvres,
-        course_unstable=found.course_unstable,
-        nomoto=nomoto(loop.model),
+        draws=draws,
+        seed=seed,
+        criteria={name: criteria[name] for name in drawn},
+        unstable=unstable,
+        course_unstable=np.array([not keeps_course(draw) for draw in loop.draws]),
+        nomoto=nomoto(model),
         pilots=tuple(sorted(pilots, key=partial(_rank, counted=loop.counted))),
         refused=designed.refused,
         tracks=tuple(loop.of_counted(held.outcome) for held in guides),
         counted=loop.counted,
         tuned=told,
     )
+
+
+def keeps_course(model: ShipModel) -> bool:
+    """Return True if a ship keeps a straight course with the rudder fixed."""
+    try:
+        return is_course_stable(model)
+    except InputError:
+        return False
 
 
 def chosen(

@@ -1,6 +1,6 @@
 """Assessment of a ship by the manoeuvring criteria of MSC.137(76)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -54,12 +54,16 @@ def imo_assessment(
     return assess_draws(model, draws)
 
 
-def assess_draws(model: ShipModel, draws: Sequence[ShipModel]) -> dict[str, Criterion]:
-    """The criteria of a model and of models drawn from it."""
+def assess_draws(
+    model: ShipModel,
+    draws: Sequence[ShipModel],
+    progress: Callable[[int], None] | None = None,
+) -> dict[str, Criterion]:
+    """The criteria of a model and of models drawn; `progress` is told of how many."""
     needed = imo_manoeuvres(model)
     own = own_indices(model, needed)
     evaluations = {name: test.evaluate for name, test in needed.items()}
-    found = intervals_of(own, draws, evaluations)
+    found = intervals_of(own, draws, evaluations, progress)
     return imo_criteria(model, found)
 
 

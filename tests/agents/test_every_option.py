@@ -57,7 +57,7 @@ LINES = (
     ("trials tanker --draws 0 --depth 25", 0),
     (
         f"autopilot ship.toml {LINEAR} --draws 2 --seed 1 --agent pid.json --autopilots"
-        " lq,ilos --engine local --workers 1 --out report",
+        " lq,ilos --out report",
         0,
     ),
     (
@@ -66,7 +66,6 @@ LINES = (
         0,
     ),
     (f"autopilot ship.toml {WRONG} --out report2", 2),
-    ("autopilot ship.toml --address 127.0.0.1:9 --out report2", 2),
     ("export report/lq.json --c c --fmu lq.fmu --name lq", 0),
     ("export path-following-ppo --onnx policy.onnx", 0),
     ("export tanker --c tanker --depth 25", 0),
