@@ -296,6 +296,19 @@ class Controller:
             state = rows.reshape(*shape, self.memory_size)
         return action, state
 
+    def after_order(self, state: Any, action: Action) -> Any:
+        """State where another order than its own was given, as beside a policy.
+
+        Its model of the gear follows that order then. `action`: shape (..., 1).
+        """
+        names = [name.rpartition(".")[2] for name in leaves(self.memory_record)]
+        if "given" not in names:
+            return state
+        told = np.array(state)
+        order = action[..., 0] * self.rudder_limit
+        told[..., names.index("given")] = order - self.neutral_rudder
+        return told
+
     def _memory_of(self, state: Any, episode_start: Any, shape: tuple[int, ...]) -> Any:
         """Record of what is remembered of ships of a shape, from a state."""
         size = self.memory_size

@@ -187,6 +187,11 @@ class Guided(Controller):
         own = next_rows(after, memory, len(rows)).reshape(*shape, -1)
         return action, (own, inner)
 
+    def after_order(self, state: Any, action: Action) -> Any:
+        """See `Controller.after_order`."""
+        own, inner = state
+        return own, self.autopilot.after_order(inner, action)
+
     def _guided(
         self, rows: Floats, memory: GuidanceMemory
     ) -> tuple[Observations, GuidanceMemory]:

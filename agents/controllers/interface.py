@@ -52,6 +52,16 @@ class Policy(Protocol):
         """
 
 
+def after_order(policy: Policy, state: Any, action: Any) -> Any:
+    """State of a policy beside which another order than its own was given.
+
+    A policy without a method of this name does not look at its orders. `action`: shape
+    (..., 1), parts of the rudder limit.
+    """
+    follow = getattr(policy, "after_order", None)
+    return state if follow is None else follow(state, action)
+
+
 def check_fits(policy: Any, task: Task, ship: ShipModel, where: str) -> None:
     """Refuse a policy made for other observations than a task shows of a ship.
 

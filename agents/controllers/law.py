@@ -93,7 +93,8 @@ class Helm(NamedTuple):
 class HelmMemory(NamedTuple):
     """Memory of `given_order`; angles from the neutral rudder."""
 
-    rudder: Number  # rad, by the model of the gear
+    rudder: Number  # rad, by the model of the gear, as the last order was given
+    given: Number  # rad, the order that the gear was given
     order: Number  # rad, the last one
     smooth: Number  # rad, order after its low-pass
     wave_1: Number  # rad, of the wave filter
@@ -121,9 +122,7 @@ def linear_law(
     that time scales the gains. The rudder that is fed back is that of a model of the
     gear: where it were measured, its feedback would eat up the margins of the order.
     """
-    has_started = memory.started > 0.0
-    last_order = seen.last_order - p.neutral_rudder
-    rudder = np.where(has_started, memory.rudder, last_order)
+    rudder = known_rudder(seen, memory, p)
     slowness = slowness_of(seen.surge, p.service_speed, p.schedule)
     gains = p.gains
     asked = (
@@ -136,6 +135,15 @@ def linear_law(
     return given_order(asked, memory._replace(rudder=rudder), p)
 
 
+def known_rudder(seen: Signals, memory: HelmMemory, p: LinearFeedback) -> Number:
+    """Rudder by the model of the gear, from the neutral angle; at first the order."""
+    helm = p.helm
+    way = helm.gear_share * (memory.given - memory.rudder)
+    rudder = memory.rudder + clipped(way, -helm.gear_step, helm.gear_step)
+    last_order = seen.last_order - p.neutral_rudder
+    return np.where(memory.started > 0.0, rudder, last_order)
+
+
 def slowness_of(speed: Number, service_speed: Number, schedule: Number) -> Number:
     """Service speed over speed as gains follow it; 1 for a schedule of 0."""
     known = clipped(speed, 0.25 * service_speed, 2.0 * service_speed)
@@ -145,7 +153,10 @@ def slowness_of(speed: Number, service_speed: Number, schedule: Number) -> Numbe
 def given_order(
     asked: Number, memory: HelmMemory, p: LinearFeedback
 ) -> tuple[Number, HelmMemory]:
-    """Order after its filters, within the limit, and what the gear makes of it."""
+    """Order after its filters, within the limit, and the next memory.
+
+    `memory.rudder` is that of now.
+    """
     helm = p.helm
     has_started = memory.started > 0.0
     calm, wave_1, wave_2 = filtered(asked, memory, helm.wave)
@@ -155,9 +166,15 @@ def given_order(
     order = np.where(has_started & is_small, memory.order, smooth)
 
     given = clipped(p.neutral_rudder + order, -helm.limit, helm.limit)
-    way = helm.gear_share * (given - p.neutral_rudder - memory.rudder)
-    rudder = memory.rudder + clipped(way, -helm.gear_step, helm.gear_step)
-    return given, HelmMemory(rudder, order, smooth, wave_1, wave_2, started=1.0)
+    return given, HelmMemory(
+        rudder=memory.rudder,
+        given=given - p.neutral_rudder,
+        order=order,
+        smooth=smooth,
+        wave_1=wave_1,
+        wave_2=wave_2,
+        started=1.0,
+    )
 
 
 def filtered(

@@ -20,6 +20,7 @@ from agents.controllers.law import (
     LinearFeedback,
     Number,
     Signals,
+    known_rudder,
     linear_law,
     wrapped,
 )
@@ -97,13 +98,13 @@ class LQGMemory(NamedTuple):
     """Memory of `lqg_law`."""
 
     motions: Motions
-    rudder: Number  # rad, of the model at the last measurement, from its neutral angle
     helm: HelmMemory
 
 
 def lqg_law(seen: Signals, memory: LQGMemory, p: Observer) -> tuple[Number, LQGMemory]:
     """Correct the estimate by what is measured and feed it back."""
-    mean_rudder = 0.5 * (memory.rudder + memory.helm.rudder)
+    rudder = known_rudder(seen, memory.helm, p.feedback)
+    mean_rudder = 0.5 * (memory.helm.rudder + rudder)
     now = updated(seen, predicted(seen, memory, mean_rudder, p), p)
     estimated = seen._replace(
         sway=p.feedback.neutral_sway + now.sway,
@@ -111,7 +112,7 @@ def lqg_law(seen: Signals, memory: LQGMemory, p: Observer) -> tuple[Number, LQGM
         heading_error=now.heading_error,
     )
     order, helm = linear_law(estimated, memory.helm, p.feedback)
-    return order, LQGMemory(now, memory.helm.rudder, helm)
+    return order, LQGMemory(now, helm)
 
 
 def predicted(

@@ -225,13 +225,15 @@ class LearnedPolicy:
                 episode_start,
                 deterministic,
             )
-            memory = memory._replace(base=base_state)
             proposed = np.asarray(order, dtype=np.float32).reshape(-1, 1)
             inputs = np.hstack([inputs, proposed])
 
         memory = self._decided(inputs, memory)
         commands = self.commands(memory.in_force, proposed)
         commands = commands.reshape(*shape, commands.shape[1])
+        if self.base is not None:
+            base_state = self.base.after_order(base_state, commands)
+            memory = memory._replace(base=base_state)
         return commands, _shaped(memory, tuple(shape))
 
     def _decided(self, inputs: Numbers, memory: PolicyMemory) -> PolicyMemory:

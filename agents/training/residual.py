@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from agents.controllers.interface import Policy
+from agents.controllers.interface import Policy, after_order
 from agents.policies.network import Numbers
 from agents.policies.policy import check_part, combined
 from shipgym.arrays import Flags
@@ -102,7 +102,9 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
     def _interval(self) -> tuple[Numbers, Numbers, Flags, list[dict[str, Any]]]:
         """Sail one control interval with the agent's outputs."""
         self._in_force = toward(self._outputs, self._in_force, self.rate_limit)
-        self.venv.step_async(combined(self._proposed, self._in_force, self.authority))
+        orders = combined(self._proposed, self._in_force, self.authority)
+        self._base_state = after_order(self.base, self._base_state, orders)
+        self.venv.step_async(orders)
         observations, rewards, dones, infos = self.venv.step_wait()
         self._in_force[dones] = 0.0
         if np.any(dones):

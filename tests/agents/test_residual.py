@@ -78,3 +78,17 @@ def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(
 def test_what_does_not_fit_is_refused(env, base, settings, message):
     with pytest.raises(InputError, match=message):
         ResidualVecEnv(ShipVecEnv(env, 2, model="mariner"), base, **settings)
+
+
+def test_a_base_knows_the_rudder_by_the_orders_that_were_given():
+    """After a while it steers as one that begins with that order in force."""
+    names = LQ_MARINER.observation_names
+    shown = np.zeros(len(names))
+    shown[[names.index("heading_error_cos"), names.index("surge")]] = 1.0
+    shown[names.index("last_command")] = 0.5
+    expected, state = LQ_MARINER.predict(shown)
+    for _ in range(100):
+        state = LQ_MARINER.after_order(state, np.array([0.5]))
+        order, state = LQ_MARINER.predict(shown, state)
+    assert order == pytest.approx(expected)
+    assert order != pytest.approx(LQ_MARINER.predict(0.0 * shown)[0])
