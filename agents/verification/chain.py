@@ -214,7 +214,7 @@ def or_simpler(fitted: Callable[..., AutopilotResult]) -> AutopilotResult:
 
 def _measured(found: Verification, fit: IdentificationResult) -> Verification:
     """A verification with what the trials measured."""
-    measured = measured_by(fit.model, fit.trials)
+    measured = measured_by(fit.model, fit.trials, fit.predictions)
     return replace(found, criteria=with_measured(found.criteria, measured))
 
 

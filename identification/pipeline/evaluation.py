@@ -203,7 +203,10 @@ def evaluated(
     predictions = {trial.name: predict(model, trial) for trial in trials}
     lost = [name for name, predicted in predictions.items() if predicted is None]
     complete = {**provenance, **problem.sea}
-    measured = {trial.name: measured_indices(model, trial) for trial in problem.used}
+    measured = {
+        trial.name: measured_indices(model, trial, predictions[trial.name])
+        for trial in problem.used
+    }
     complete["measured"] = {
         name: {index: asdict(value) for index, value in indices.items()}
         for name, indices in measured.items()

@@ -29,6 +29,14 @@ class Side(NamedTuple):
     outside: bool = False  # whether the manoeuvre leaves the envelope of the trials
     measured: MeasuredIndex | None = None
 
+    @property
+    def by_execution(self) -> float:
+        """What the rudder of the trial changes of the index, by the model."""
+        known = self.measured
+        if known is None or known.predicted is None or self.drawn.value is None:
+            return 0.0
+        return abs(known.predicted - self.drawn.value)
+
 
 class Chances(NamedTuple):
     """Probabilities that a criterion is met and that it is missed.
@@ -221,13 +229,16 @@ class Criterion:
 
     @property
     def contradicted(self) -> bool:
-        """Whether the model's interval on a side excludes what was measured there."""
+        """Whether the model's interval on a side excludes what was measured there.
+
+        Up to what the trial's own rudder, instead of the standard one, changes.
+        """
         for side in self.sides:
             interval = side.drawn.interval
             if side.measured is None or interval is None:
                 continue
             low, high = interval
-            reach = 1.96 * side.measured.error
+            reach = 1.96 * side.measured.error + side.by_execution
             above = high is not None and side.measured.value - reach > high
             if above or side.measured.value + reach < low:
                 return True

@@ -4,8 +4,8 @@ They are read from a smoothed heading and track: the largest of noisy samples re
 high. Source of the smoothing: Reinsch 1967, Smoothing by spline functions.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,9 @@ class MeasuredIndex:
     value: float  # ship lengths or degrees
     error: float  # its standard error
     side: str  # to which the rudder was ordered first, "starboard" or "port"
+    #: by the model with the trial's own rudder, which no helmsman moves as a standard
+    #: manoeuvre has it
+    predicted: float | None = None
 
     def share_below(self, limit: float) -> float:
         """Probability that the ship's own index is within a limit."""
@@ -43,12 +46,15 @@ class MeasuredIndex:
 
 
 def measured_by(
-    model: ShipModel, trials: Sequence[Trial]
+    model: ShipModel, trials: Sequence[Trial], simulated: Mapping[str, Trial | None]
 ) -> list[tuple[str, MeasuredIndex]]:
-    """Criteria that trials measure, each by its name, in the order of the trials."""
+    """Criteria that trials measure, each by its name, in the order of the trials.
+
+    `simulated`: trials by the model, by name.
+    """
     found = list[tuple[str, MeasuredIndex]]()
     for trial in trials:
-        found += measured_indices(model, trial).items()
+        found += measured_indices(model, trial, simulated.get(trial.name)).items()
     return found
 
 
@@ -61,23 +67,33 @@ def measured_in_file(model: ShipModel) -> list[tuple[str, MeasuredIndex]]:
     table = provenance.get("measured", {})
     trials = [trial.get("name") for trial in provenance.get("trials", ())]
     where = f"{model.name}: provenance.measured"
+    known = [one.name for one in fields(MeasuredIndex)]
     found = list[tuple[str, MeasuredIndex]]()
     for trial, indices in check_table(table, where, trials).items():
         names = check_table(indices, f"{where} {trial}", RULES)
-        for name, fields in names.items():
+        for name, given in names.items():
             own = f"{where} {trial} {name}"
-            values = check_table(fields, own, ("value", "error", "side"))
+            values = check_table(given, own, known)
+            predicted = values.get("predicted")
+            if predicted is not None:
+                check_number(predicted, f"{own} predicted")
             index = MeasuredIndex(
                 check_number(values.get("value"), f"{own} value"),
                 check_number(values.get("error"), f"{own} error", at_least=0.0),
                 check_choice(values.get("side"), ("starboard", "port"), f"{own} side"),
+                predicted,
             )
             found.append((name, index))
     return found
 
 
-def measured_indices(model: ShipModel, trial: Trial) -> dict[str, MeasuredIndex]:
-    """Criteria that a trial measures, by name; none for another manoeuvre."""
+def measured_indices(
+    model: ShipModel, trial: Trial, simulated: Trial | None = None
+) -> dict[str, MeasuredIndex]:
+    """Criteria that a trial measures, by name; none for another manoeuvre.
+
+    `simulated`: the same trial by the model.
+    """
     if trial.kind not in ("zigzag", "turning-circle") or not _at_speed(model, trial):
         return {}
     try:
@@ -85,9 +101,14 @@ def measured_indices(model: ShipModel, trial: Trial) -> dict[str, MeasuredIndex]
         rules = {
             name: rule for name, rule in RULES.items() if rule.manoeuvre == manoeuvre
         }
-        return _with_errors(model, trial, rules)
+        found = _with_errors(model, trial, rules)
+        predicted = {} if simulated is None else _values(model, simulated, rules)
     except InputError:  # a channel such as the position is missing
         return {}
+    return {
+        name: replace(index, predicted=predicted.get(name))
+        for name, index in found.items()
+    }
 
 
 def _with_errors(
