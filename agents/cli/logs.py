@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from typer import Argument, Exit, Option
+from typer import Argument, Option
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,13 +37,6 @@ def new_ship_command(
             help="Length between perpendiculars, m; or fill it in later.",
         ),
     ] = None,
-    update: Annotated[
-        Path | None,
-        Option(
-            metavar="SHIP.TOML",
-            help="Check this ship file again after a correction; list all faults.",
-        ),
-    ] = None,
 ) -> None:
     """Write a ship file for recorded trials.
 
@@ -54,15 +47,11 @@ def new_ship_command(
     from shipgym.files import write_text
     from shipgym.pages import render
 
-    if update is not None:
-        _check_again(update)
-        return
     if not logs:
         raise InputError("new-ship: expected a log, got none; name its file")
     if out.exists():
         raise InputError(
-            f"{out}: exists already; choose another name with --out, remove it, or"
-            f" check it again: shipgym new-ship --update {out}"
+            f"{out}: exists already; choose another name with --out, or remove it"
         )
     guessed = _guess_trials(logs)
     facts = _facts(guessed, out) | {"length": length}
@@ -72,15 +61,15 @@ def new_ship_command(
     side = facts["side"]
     read = [one.trial for one in guessed if one.trial is not None]
     notes = list(dict.fromkeys(note for trial in read for note in trial.notes))
-    columns = {
-        one.channel: {"column": one.column, "unit": one.unit}
-        for one in guessed[0].columns
-    }
+    first, *_ = guessed
     answer(
         {
             "written": str(out),
-            "columns": columns,
-            "unused": guessed[0].unused,
+            "columns": {
+                one.channel: {"column": one.column, "unit": one.unit}
+                for one in first.columns
+            },
+            "unused": first.unused,
             "rudder_positive": side.side if side else None,
             **{one.name: one.value for one in facts["conventions"]},
             "to_decide": facts["to_decide"],
@@ -91,20 +80,6 @@ def new_ship_command(
     say(summary.strip())
     for note in notes:
         warn(note)
-
-
-def _check_again(path: Path) -> None:
-    """Read all trials of a ship file; exit code 1 where one cannot be read."""
-    from agents.cli.terminal import answer, say
-    from shipgym.trials.ship_file import ShipFile
-
-    faults = ShipFile.load(path).faults()
-    answer({"checked": str(path), "faults": faults})
-    for fault in faults:
-        say(f"to correct: {fault}")
-    if faults:
-        raise Exit(1)
-    say(f"{path}: all trials are read; next: shipgym look {path}")
 
 
 def _facts(guessed: list[TrialGuess], out: Path) -> dict[str, Any]:
@@ -195,38 +170,31 @@ def _entry(
     guess: TrialGuess, shared: list[ColumnGuess], folder: Path
 ) -> dict[str, Any]:
     """A log for the template of the ship file."""
-    of_trial = [one.choices for one in guess.decisions if one.section == "trials"]
-    cut, manoeuvres = _cut(guess)
+    of_trial = []
+    for one in guess.decisions:
+        if one.section == "trials":
+            of_trial.append(one.choices)
     return {
         "file": _toml_paths(guess.paths, folder),
         "columns": [one for one in guess.columns if one not in shared],
-        "cut": cut,
-        "manoeuvres": manoeuvres,
+        "manoeuvres": _manoeuvres(guess),
         "decision": next(iter(of_trial), None),
     }
 
 
-def _cut(guess: TrialGuess) -> tuple[str, int]:
-    """Cut into runs between gaps, or by the rudder in a log that is idle for long.
-
-    With the number of trials; an empty text for none.
-    """
+def _manoeuvres(guess: TrialGuess) -> int:
+    """Number of trials in a log by its rudder, where it is idle for long; else none."""
     import numpy as np
 
-    from shipgym.trials.cuts import active_stretches, runs
+    from shipgym.trials.cuts import active_stretches
 
     trial = guess.trial
     if trial is None or "delta" not in trial:
-        return "", 0
-    between_gaps = runs(trial.t)
-    if len(between_gaps) > 1:
-        return json.dumps(between_gaps), len(between_gaps)
+        return 0
     stretches = active_stretches(trial.t, trial["delta"])
     active = sum(last - first for first, last in stretches)
     is_idle = abs(float(np.median(trial["delta"]))) < 0.05  # rad
-    if is_idle and active < trial.duration / 1.5 and stretches:
-        return '"rudder"', len(stretches)
-    return "", 0
+    return len(stretches) if is_idle and active < trial.duration / 1.5 else 0
 
 
 def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
@@ -315,31 +283,28 @@ def look_command(
     else:
         guess = guess_trial(log)
         if guess.trial is None:
-            wrong = "; ".join(
-                f"{one.key}: expected {one.choices}" for one in guess.decisions
-            )
+            wrong = [f"{one.key}: expected {one.choices}" for one in guess.decisions]
             raise InputError(
-                f"{log}: {wrong}; shipgym new-ship {log} writes a ship file in which to"
-                " say so"
+                f"{log}: {'; '.join(wrong)}; shipgym new-ship {log} writes a ship file"
+                " in which to say so"
             )
         trials = [guess.trial]
         readings = [guess.reading]
         remarks = [one.choices for one in guess.decisions]
 
     write_text(look_page(log.name, trials, readings, remarks), out)
-    fields = [
-        {
-            "name": trial.name,
-            "samples": len(trial),
-            "duration_s": trial.duration,
-            "channels": [*trial.channels],
-            "read_as": reading,
-            "notes": [*trial.notes],
-        }
-        for trial, reading in zip(trials, readings, strict=True)
-    ]
-    answer({"written": str(out), "trials": fields, "to_decide": remarks})
+    fields = []
     for trial, reading in zip(trials, readings, strict=True):
+        fields.append(
+            {
+                "name": trial.name,
+                "samples": len(trial),
+                "duration_s": trial.duration,
+                "channels": [*trial.channels],
+                "read_as": reading,
+                "notes": [*trial.notes],
+            }
+        )
         say(
             f"{trial.name}: {len(trial)} samples over {trial.duration:.5g} s:"
             f" {', '.join(trial.channels)}"
@@ -350,4 +315,5 @@ def look_command(
             warn(f"{trial.name}: {note}")
     for remark in remarks:
         warn(remark)
+    answer({"written": str(out), "trials": fields, "to_decide": remarks})
     say(f"written: {out}")

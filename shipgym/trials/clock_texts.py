@@ -62,7 +62,7 @@ def read_clock(texts: Sequence[str]) -> Floats:
     else:
         orders = (False,) if first[:4].isdigit() else (True, False)
         zero = pd.Timestamp(0, tz="UTC")
-        candidates = [_moments(series, first, order) - zero for order in orders]
+        candidates = [_moments(series, order) - zero for order in orders]
     # no dates at all are worse than those that span a long time
     likelier = min(
         candidates, key=lambda one: (one.isna().sum(), one.max() - one.min())
@@ -77,25 +77,21 @@ def read_clock(texts: Sequence[str]) -> Floats:
     return seconds
 
 
-def _moments(
-    series: Any,
-    first: str,
-    day_first: bool,
-) -> Any:
+def _moments(series: Any, day_first: bool) -> Any:
     """Moments of texts, by the form of the first one where they have it."""
     import pandas as pd
 
-    form = "ISO8601"
-    if not first[:4].isdigit():
-        guess = pd.tseries.api.guess_datetime_format
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of the other order
-            form = guess(first, dayfirst=day_first) or "mixed"
-    moments = pd.to_datetime(series, utc=True, format=form, errors="coerce")
-    rest = moments.isna() & series.notna()
-    if rest.any():
-        settings = {"utc": True, "dayfirst": day_first, "errors": "coerce"}
-        moments[rest] = pd.to_datetime(series[rest], format="mixed", **settings)
+    def read(texts: Any, **form: str) -> Any:
+        return pd.to_datetime(
+            texts, utc=True, dayfirst=day_first, errors="coerce", **form
+        )
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the other order
+        moments = read(series)
+        rest = moments.isna() & series.notna()
+        if rest.any():
+            moments[rest] = read(series[rest], format="mixed")
     return moments
 
 

@@ -13,7 +13,11 @@ from shipgym.trials.units import LARGEST_MAGNITUDES
 
 #: Degrees that the full deflection of a steering command counts as.
 FULL_RUDDER_DEG = 35.0
-#: Numbers that AIS, J1939 and loggers write for "no value".
+#: Numbers that loggers write for "no value", and those of AIS and J1939.
+_COMMON = (
+    *(4294967295.0, 2147483647.0, -2147483648.0, 99999.0, -99999.0, 65535.0),
+    *(-32768.0, 32767.0, 9999.9, 9999.0, -9999.0, 999.9, 999.0, -999.0),
+)
 _SENTINELS = {
     "sog": (102.3,),
     "stw": (102.3,),
@@ -21,7 +25,6 @@ _SENTINELS = {
     "psi": (511.0,),
     "r": (-128.0, 128.0, -731.0, 731.0),
 }
-_COMMON = (-32768.0, 32767.0, 65535.0, 2147483647.0, -2147483648.0, 4294967295.0)
 
 
 def column_numbers(table: LogTable, column: Column) -> Floats:
@@ -54,23 +57,17 @@ def without_sentinels(
     largest = LARGEST_MAGNITUDES[channel] / factor
     if channel in ("psi", "cog", "wind_from"):
         largest = min(largest, 2.0 * np.pi / factor + 1.0)
-    known = (*_COMMON, *_SENTINELS.get(channel, ()))
-    written = np.unique(numbers[np.abs(numbers) > 99.0]).tolist()
-    outermost = {*written[:3], *written[-3:]}
     values = numbers
     words = []
-    for number in sorted(outermost, key=abs, reverse=True):
-        digits = f"{abs(number):.10g}".replace(".", "")
-        are_nines = abs(number) >= 999.0 and set(digits) == {"9"}
-        others = np.abs(values[np.isfinite(values) & (values != number)])
-        is_far = others.size and abs(number) / 3.0 > others.max()
-        is_place = channel in ("x", "y")  # which may be that far
-        if number not in known and (is_place or not are_nines):
+    for number in (*_COMMON, *_SENTINELS.get(channel, ())):
+        is_number = numbers == number
+        count = np.count_nonzero(is_number)
+        if not count:
             continue
+        others = np.abs(values[np.isfinite(values) & ~is_number])
+        is_far = others.size and abs(number) / 3.0 > others.max()
         if is_far or abs(number) > largest:
-            is_number = numbers == number
             values = np.where(is_number, np.nan, values)
-            count = np.count_nonzero(is_number)
             words.append(f'{count} values of {number:g} stand for "no value"')
     return values, words
 

@@ -28,7 +28,6 @@ class Column:
     unit: str = ""  # none: as the reader knows it, else the SI unit
     date: str | None = None  # column of the date
     zone: str = "UTC"  # how far the clock is ahead of UTC, as "+02:00"
-    nanoseconds: str | None = None  # column of what is to be added to whole seconds
     minus: str | None = None  # column that is subtracted: of the other propeller
     neutral: float = 0.0  # number of a steering command that steers straight
     full: float | None = None  # change of the command that counts as 35 deg of rudder
@@ -69,7 +68,7 @@ class Locator:
 
 #: Keys of the column of a channel, beside those of each.
 _KEYS = {
-    "t": ["date", "zone", "nanoseconds"],
+    "t": ["date", "zone"],
     "psi": ["quaternion"],
     "delta": ["minus", "neutral", "full"],
     "delta_command": ["minus", "neutral", "full"],
@@ -82,12 +81,12 @@ def parse_columns(
     """Check a table of columns by channel.
 
     Each entry is the name of a column or ``{"column": name, "unit": unit}``, with
-    ``"file"``, its name, where several files of one log have that column. That of
-    the time may also have ``"date"``, the column of the date, ``"nanoseconds"`` and
-    ``"zone"``, that of the heading ``"quaternion"``, the columns of x, y and z beside
-    that of w, that of the rudder ``"full"``, ``"neutral"`` and ``"minus"``, which make
-    a steering command. `where` begins the messages. Raises InputError for an unknown
-    channel, key or unit, a unit of another quantity, and a column that is given twice.
+    ``"file"``, its name, where several files of one log have that column. That of the
+    time may also have ``"date"``, the column of the date, and ``"zone"``, that of the
+    heading ``"quaternion"``, the columns of x, y and z beside that of w, that of the
+    rudder ``"full"``, ``"neutral"`` and ``"minus"``, which make a steering command.
+    `where` begins the messages. Raises InputError for an unknown channel, key or unit,
+    a unit of another quantity, and a column that is given twice.
     """
     check_table(columns, where)
     parsed: dict[str, Column] = {}
@@ -121,31 +120,25 @@ def _parse_column(channel: str, entry: Any, where: str) -> Column:
     for key, value in fields.items():
         if key in ("neutral", "full"):
             fields[key] = check_number(value, f"{where} {key}")
-        elif key == "quaternion":
-            fields[key] = _three_names(value, where)
-        else:
+        elif key != "quaternion":
             check_text(value, f"{where} {key}")
+        elif isinstance(value, list | tuple) and [*map(type, value)] == [str] * 3:
+            fields[key] = tuple(value)
+        else:
+            raise InputError(
+                f"{where} quaternion: expected the columns of x, y and z, beside that"
+                f' of w in column, such as ["q[1]", "q[2]", "q[3]"], got {value!r}'
+            )
     is_command = not fields.keys().isdisjoint(("neutral", "full", "minus"))
-    if is_command and (not fields.get("full") or fields.get("unit", "deg") != "deg"):
+    if is_command and (
+        not fields.get("full") or fields.setdefault("unit", "deg") != "deg"
+    ):
         raise InputError(
             f"{where}: expected full, the change of the command that counts as 35 deg"
             " of rudder, not zero, and no unit, with neutral or minus; give full, such"
             " as 400 of a pulse width in us"
         )
-    if is_command:
-        fields["unit"] = "deg"
     return Column(name.strip(), **fields)
-
-
-def _three_names(names: Any, where: str) -> tuple[str, ...]:
-    """The columns of x, y and z of a quaternion."""
-    are_three = isinstance(names, list | tuple) and len(names) == 3
-    if not are_three or not all(isinstance(name, str) for name in names):
-        raise InputError(
-            f"{where} quaternion: expected the columns of x, y and z, beside that of w"
-            f' in column, such as ["q[1]", "q[2]", "q[3]"], got {names!r}'
-        )
-    return tuple(name.strip() for name in names)
 
 
 def choose_columns(

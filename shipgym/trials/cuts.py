@@ -8,7 +8,7 @@ from shipgym.arrays import Floats
 from shipgym.checks import shown
 from shipgym.errors import InputError
 from shipgym.trials.clock_texts import DAY, clock_text, is_dated, read_clock
-from shipgym.trials.resampling import FEWEST_SAMPLES, Log, usual_step
+from shipgym.trials.resampling import FEWEST_SAMPLES, Log
 from shipgym.trials.units import DEGREE
 
 _EXPECTED = (
@@ -67,13 +67,11 @@ def cut_log(
 
 def _span(log: Log) -> str:
     """First and last time of a log, in seconds and by its clock."""
-    first, last = log.t[0], log.t[-1]
-    span = f"{first:g} to {last:g} s"
+    ends = log.t[0], log.t[-1]
+    span = " to ".join(f"{one:g}" for one in ends) + " s"
     if log.start is None:
         return span
-    opening = clock_text(log.start + first)
-    closing = clock_text(log.start + last)
-    return f"{span}, {opening} to {closing}"
+    return f"{span}, " + " to ".join(clock_text(log.start + one) for one in ends)
 
 
 def _seconds(moment: float | str, log: Log, where: str) -> float:
@@ -95,15 +93,6 @@ def _seconds(moment: float | str, log: Log, where: str) -> float:
     after %= DAY
     is_before = after >= log.t[-1] + 0.5 * DAY
     return after - DAY if is_before else after
-
-
-def runs(t: Floats) -> list[list[float]]:
-    """First and last time, s, of the parts of a log between long gaps."""
-    gap = max(60.0, 20.0 * usual_step(t))
-    is_gap = np.diff(t) > gap
-    starts = np.flatnonzero(is_gap) + 1
-    parts = np.split(t, starts)
-    return [[float(one[0]), float(one[-1])] for one in parts if np.ptp(one) > _SHORTEST]
 
 
 def active_stretches(t: Floats, delta: Floats | None) -> list[list[float]]:

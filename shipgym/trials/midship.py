@@ -1,6 +1,7 @@
 """Conversion of a log's frame and origin to body-frame velocities at midship."""
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -73,22 +74,21 @@ def _cg_to_midship(log: Log, xg: float) -> None:
 
     The centre of gravity is `xg` m forward of midship.
     """
+    moves: dict[str, tuple[str, Any]] = {
+        "v": ("r", np.negative),
+        "x": ("psi", lambda psi: -np.cos(psi)),
+        "y": ("psi", lambda psi: -np.sin(psi)),
+        "N": ("Y", np.positive),
+    }
     channels = log.channels
-    needed = {"v": "r", "x": "psi", "y": "psi", "N": "Y"}
-    moved = {}
-    for name in needed.keys() & channels.keys():
-        other = needed[name]
+    for name in moves.keys() & channels.keys():
+        other, factor = moves[name]
         if not log.has(other):
             raise InputError(
                 f'{log.where}: origin = "cg": expected {other} to move {name} to'
                 " midship, got none; name its column"
             )
-        factor = {"r": -1.0, "Y": 1.0}.get(other, 0.0) * channels[other]
-        if other == "psi":
-            direction = np.cos if name == "x" else np.sin
-            factor = -direction(channels["psi"])
-        moved[name] = channels[name] + xg * factor
-    channels |= moved
+        channels[name] = channels[name] + xg * factor(channels[other])
 
 
 def _to_midship(

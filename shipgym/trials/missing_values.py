@@ -36,7 +36,8 @@ def check_time(t: Floats, locator: Locator) -> None:
         remedy = "where a clock was set back, as at the end of summer, log UTC"
     raise InputError(
         f"{locator.place(row, 't')}: expected time to increase from row to row, got one"
-        f" that {change}; {remedy}, or split the file into one per run"
+        f" that {change}; {remedy}, keep those of one receiver, or split the file into"
+        " one per run"
     )
 
 
@@ -50,7 +51,6 @@ def fill_missing(
     a time is missing, no row is whole, or a hole is too long.
     """
     _check_present(t, channels, locator, repair)
-    check_time(t, locator)
     rows = np.flatnonzero(np.isfinite([*channels.values()]).all(axis=0))
     if rows.size < FEWEST_SAMPLES:
         raise InputError(

@@ -149,50 +149,51 @@ def _signals(
 ) -> tuple[Signals, Locator, dict[str, int]]:
     """Signals of channels, their locator, and counts of values filled in.
 
-    The channels are on the clock of the rows, or each on a clock of its own.
+    The channels are on the clock of the rows, or each on a clock of its own, where it
+    has values.
     """
     filled: dict[str, int] = {}
     if "psi" in channels:
-        channels["psi"], spikes = without_spikes(channels["psi"])
-        if spikes:
-            filled["psi"] = spikes
+        channels["psi"], filled["psi"] = without_spikes(channels["psi"])
     is_whole = bool(np.isfinite([t, *channels.values()]).all())
     own_clocks = locator.table.own_clocks or have_own_clocks(t, channels)
-    if not is_whole and own_clocks:
-        return _own_signals(t, channels, locator), locator, filled
-    if is_whole:
+    is_shared = is_whole or not own_clocks
+    if is_shared:
         check_time(t, locator)
-    else:
+    if is_shared and not is_whole:
         t, channels, locator, missing = fill_missing(t, channels, locator, repair)
         filled = dict(Counter(filled) + Counter(missing))
     check_ranges({"t": t, **channels}, locator)
     signals = {}
     for name, values in channels.items():
-        continuous = _continuous(name, t, values, locator)
-        signals[name] = Signal(t, continuous)
+        signal, here = Signal(t, values), locator
+        if not is_shared:
+            signal, here = _own_signal(name, t, values, locator)
+        if name in ("psi", "wind_from"):  # without jumps
+            unwrapped = np.unwrap(signal.values)
+            if name == "psi":
+                check_heading(signal.t, unwrapped, signal.values, here)
+            signal = signal._replace(values=unwrapped)
+        signals[name] = signal
     return signals, locator, filled
 
 
-def _own_signals(
-    t: Floats,
-    channels: dict[str, Floats],
-    locator: Locator,
-) -> Signals:
-    check_ranges({"t": t, **channels}, locator)
-    signals = {}
-    for name, values in channels.items():
-        signals[name] = _own_signal(name, t, values, locator)
-    return signals
+def _own_signal(
+    channel: str, t: Floats, values: Floats, locator: Locator
+) -> tuple[Signal, Locator]:
+    """A channel where it has values, and their places.
 
-
-def _continuous(channel: str, t: Floats, values: Floats, locator: Locator) -> Floats:
-    """Values of a channel, headings and directions of the wind without jumps."""
-    if channel not in ("psi", "wind_from"):
-        return values
-    unwrapped = np.unwrap(values)
-    if channel == "psi":
-        check_heading(t, unwrapped, values, locator)
-    return unwrapped
+    InputError for too few or time that goes back.
+    """
+    rows = np.flatnonzero(np.isfinite(values))
+    if rows.size < FEWEST_SAMPLES:
+        raise InputError(
+            f"{locator.path}: column '{locator.columns[channel].name}': expected"
+            f" {FEWEST_SAMPLES} values or more, got {rows.size}; leave it out"
+        )
+    here = replace(locator, rows=locator.rows[rows])
+    check_time(t[rows], here)
+    return Signal(t[rows], values[rows]), here
 
 
 def _local_track(
@@ -232,29 +233,6 @@ def _local_track(
     north[rows[~is_far]] = x[~is_far]
     east[rows[~is_far]] = y[~is_far]
     return north, east, int(is_far.sum())
-
-
-def _own_signal(channel: str, t: Floats, values: Floats, locator: Locator) -> Signal:
-    """A channel where it has values; InputError for too few or time that goes back."""
-    rows = np.flatnonzero(np.isfinite(values))
-    column = locator.columns[channel].name
-    if rows.size < FEWEST_SAMPLES:
-        raise InputError(
-            f"{locator.path}: column '{column}': expected {FEWEST_SAMPLES} values or"
-            f" more, got {rows.size}; leave it out"
-        )
-
-    clock = t[rows]
-    here = replace(locator, rows=locator.rows[rows])
-    stands_still = np.diff(clock) <= 0.0
-    if stands_still.any():
-        k = int(np.argmax(stands_still))
-        raise InputError(
-            f"{here.place(k + 1, 't')}: expected time to increase between values of"
-            f" '{column}', got {clock[k]:.10g} and then {clock[k + 1]:.10g} s; sort the"
-            " rows, or, where two ships or receivers are in the file, keep those of one"
-        )
-    return Signal(clock, _continuous(channel, clock, values[rows], here))
 
 
 def _make_velocity(signals: Signals) -> None:

@@ -1,7 +1,6 @@
 """Times of the rows of a table: numbers in their unit, clock times, repeated ones."""
 
 import re
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +11,7 @@ from shipgym.trials.clock_texts import DAY, read_clock, spread_evenly, zone_seco
 from shipgym.trials.columns import Column
 from shipgym.trials.readers.cell_texts import is_number
 from shipgym.trials.readers.log_table import REPAIR, LogTable
+from shipgym.trials.resampling import usual_step
 from shipgym.trials.units import si_factor
 
 #: Zero of the units that count from a date, s since 1970.
@@ -23,12 +23,9 @@ _EPOCHS = {
     "excel days": -25_569.0 * DAY,
     "matlab days": -719_529.0 * DAY,
 }
-_STAMP = re.compile(r"(\d{9,10})\.(\d{1,9})")
 _COMPACT = re.compile(
     r"((?:19|20)\d\d[01]\d[0-3]\d)?([0-2]\d)([0-5]\d)([0-5]\d(?:\.\d+)?)"
 )
-#: Fewest rows of a run in a file of several, and the pause that is put between them, s.
-_FEWEST_ROWS, PAUSE_S = 20, 600.0
 
 
 class RowTimes(NamedTuple):
@@ -47,15 +44,7 @@ def read_times(table: LogTable, column: Column) -> RowTimes:
     """
     cells = _time_cells(table, column)
     notes: list[str] = []
-    padded = _padded(cells)
-    compact = None if padded else _with_colons(cells)
-    if padded:
-        table = replace(
-            table, cells={**table.cells, column.name: np.array(padded, object)}
-        )
-        notes.append(
-            f"the digits behind the point of column '{column.name}' count nanoseconds"
-        )
+    compact = _with_colons(cells)
     if compact:
         notes.append(f"column '{column.name}' is the clock without colons, hhmmss")
     is_numeric = not compact and is_number(next(filter(None, cells), "0"))
@@ -63,12 +52,10 @@ def read_times(table: LogTable, column: Column) -> RowTimes:
         clock = _read_clock_cells(table, column, compact or cells)
     else:
         clock = si_factor("t", column.unit) * table.numbers(column.name)
-        if column.nanoseconds is not None:
-            clock += 1e-9 * table.numbers(column.nanoseconds)
         if column.unit.endswith("days"):
             clock = np.round(clock, 3)  # days have some nine decimals
         clock += _EPOCHS.get(column.unit, 0.0)
-    clock = _one_after_another(_spread(clock, notes), table, column, notes)
+    clock = _spread(clock, notes)
     if is_numeric and column.unit not in _EPOCHS:
         return RowTimes(clock, column.unit, start=None, notes=notes)
     known = clock[np.isfinite(clock)]
@@ -91,39 +78,17 @@ def _time_cells(table: LogTable, column: Column) -> list[str]:
     return [f"{day} {cell}".strip() for day, cell in zip(days, cells, strict=True)]
 
 
-def _padded(cells: list[str]) -> list[str]:
-    """Times whose fractions are counts of nanoseconds, with their zeros; or none.
-
-    As ROS joins seconds and nanoseconds: then alone the times increase.
-    """
-    stamps = [_STAMP.fullmatch(cell) for cell in cells]
-    if len(stamps) < 3 or not all(stamps):
-        return []
-    padded = [f"{stamp[1]}.{stamp[2]:0>9}" for stamp in stamps if stamp]
-    given = np.array(cells, dtype=np.float64)
-    goes_back = np.any(np.diff(given) <= 0.0)
-    meant = np.array(padded, dtype=np.float64)
-    increases = np.all(np.diff(meant) > 0.0)
-    return padded if goes_back and increases else []
-
-
 def _with_colons(cells: list[str]) -> list[str]:
     """Clock times that are written without colons, with or without the date; or none.
 
     Numbers that only look so count beyond 59, or do not pass a minute.
     """
-    times = []
-    minutes = set()
-    for cell in cells:
-        match = _COMPACT.fullmatch(cell)
-        if cell and match is None:
-            return []
-        date, hour, minute, second = match.groups() if match else ("", "", "", "")
-        day = f"{date[:4]}-{date[4:6]}-{date[6:]} " if date else ""
-        times.append(f"{day}{hour}:{minute}:{second}" if match else "")
-        minutes.add((hour, minute, bool(date)))
-    is_dated = all(dated for *_, dated in minutes)
-    return times if is_dated or len(minutes) > 1 else []
+    if not all(_COMPACT.fullmatch(cell) for cell in cells if cell):
+        return []
+    times = [_COMPACT.sub(r"\1 \2:\3:\4", cell).strip() for cell in cells]
+    minutes = {time[:-3] for time in times}
+    has_date = any(" " in time for time in times)
+    return times if has_date or len(minutes) > 1 else []
 
 
 def _read_clock_cells(table: LogTable, column: Column, cells: list[str]) -> Floats:
@@ -146,19 +111,15 @@ def _spread(clock: Floats, notes: list[str]) -> Floats:
 
     A few rows at one time are left to the check that time increases.
     """
-    if not np.isfinite(clock).all():
-        return clock
     steps = np.diff(clock)
     repeats = np.count_nonzero(steps == 0.0)
-    is_first = np.concatenate([[True], steps > 0.0])
-    firsts = np.flatnonzero(is_first)
+    firsts = np.flatnonzero(np.append(True, steps > 0.0))
     is_coarse = 3 * repeats >= steps.size > 3 and firsts.size >= 3
     if not is_coarse or not np.all(steps >= 0.0):
         return clock
     moments = clock[firsts]
-    tick = float(np.median(np.diff(moments)))
-    edges = np.append(firsts, clock.size)
-    sizes = np.diff(edges)
+    tick = usual_step(moments)
+    sizes = np.diff(firsts, append=clock.size)
     usual = int(np.median(sizes))
     notes.append(
         f"the clock shows {repeats} of {clock.size} times again: it counts in steps of"
@@ -166,30 +127,3 @@ def _spread(clock: Floats, notes: list[str]) -> Floats:
     )
     group = np.repeat(np.arange(firsts.size), sizes)
     return spread_evenly(group, moments, tick, usual)
-
-
-def _one_after_another(
-    clock: Floats, table: LogTable, column: Column, notes: list[str]
-) -> Floats:
-    """Times of several runs in one file, each after the one before with a pause.
-
-    Where time goes back between long runs; a clock that is set back by up to an hour is
-    left to the check that time increases.
-    """
-    if np.isinf(clock).any():
-        return clock
-    starts = np.flatnonzero(np.diff(clock) < 0.0) + 1
-    edges = np.concatenate([[0], starts, [clock.size]])
-    back = clock[starts - 1] - clock[starts]
-    if not starts.size or np.diff(edges).min() < _FEWEST_ROWS or back.min() < 10.0:
-        return clock
-    if np.any((back > 1700.0) & (back < 3700.0)):
-        return clock
-    after = clock.copy()
-    for start, step in zip(starts.tolist(), back.tolist(), strict=True):
-        after[start:] += step + PAUSE_S
-        notes.append(
-            f"{table.cell(start, column.name)}: time goes back by {step:.6g} s: another"
-            f" run begins, read as {PAUSE_S:g} s after the one before"
-        )
-    return after

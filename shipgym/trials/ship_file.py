@@ -7,7 +7,6 @@ from typing import Any, Self
 
 from shipgym.checks import check_choice, check_keys, check_table, data_only, placed
 from shipgym.errors import InputError
-from shipgym.files import read_toml
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import own_structure
@@ -17,7 +16,7 @@ from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import USES, Trial, cut_trials, trial_of
 from shipgym.trials.trial_entries import TrialEntry, read_entries
 from shipgym.trials.trial_import import import_tables
-from shipgym.trials.undecided import take_undecided
+from shipgym.trials.undecided import read_decided
 
 _SECTIONS = (
     "ship",
@@ -74,8 +73,7 @@ class ShipFile:
         remedy.
         """
         path = Path(path)
-        data = read_toml(path, "ship file")
-        undecided = take_undecided(data, path)
+        data, undecided = read_decided(path)
         check_keys(data, _SECTIONS, str(path))
         particulars = _read_particulars(path, data)
         steering = structure = None
@@ -104,25 +102,12 @@ class ShipFile:
             raise InputError(self.undecided[0])
         if use is not None:
             check_choice(use, USES, f"{self.path}: trials(use)")
-        trials = []
-        for entry in self.entries:
-            is_wanted = entry.use == use
-            if use is None:
-                is_wanted = entry.use != "skip"
-            if is_wanted:
-                trials += self._read(entry)
-        return trials
-
-    def faults(self) -> list[str]:
-        """What is left to decide, and what is wrong with each log; empty if nothing."""
-        faults = [*self.undecided]
-        for entry in self.entries:
-            try:
-                if entry.use != "skip":
-                    self._read(entry)
-            except InputError as error:
-                faults.append(str(error))
-        return faults
+        return [
+            trial
+            for entry in self.entries
+            if entry.use == use or (use is None and entry.use != "skip")
+            for trial in self._read(entry)
+        ]
 
     def trial(self, file: str) -> Trial:
         """Read one trial by its ``file``, whatever its use; of a cut log the first."""

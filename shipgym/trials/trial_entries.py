@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -70,30 +70,30 @@ def read_entries(
     columns = parse_columns(data.get("columns", {}), f"{path}: [columns]")
     sensors = check_table(data.get("sensors", {}), f"{path}: [sensors]")
     where = f"{path}: [conventions]"
-    conventions = Conventions(
-        **check_table(data.get("conventions", {}), where, _CONVENTIONS),
-        xg=ship.xg,
-        where=where,
-        installation=Installation.from_mapping(sensors, f"{path}: [sensors]"),
-    )
+    words = check_table(data.get("conventions", {}), where, _CONVENTIONS)
+    Conventions(**words, xg=ship.xg, where=where)
+    Installation.from_mapping(sensors, f"{path}: [sensors]")
     entries: dict[tuple[str, ...], TrialEntry] = {}
     for number, table in enumerate(tables, start=1):
         where = f"{path}: [[trials]] {number}"
         check_table(table, where, _KEYS)
-        words: dict[str, Any] = {
-            key: table[key] for key in _CONVENTIONS if key in table
-        }
-        if "sensors" in table:
-            place = f"{where} sensors"
-            own = {**sensors, **check_table(table["sensors"], place)}
-            words["installation"] = Installation.from_mapping(own, place)
+        place = f"{where} sensors"
+        own_sensors = check_table(table.get("sensors", {}), place)
         own_columns = parse_columns(table.get("columns", {}), f"{where} columns")
+        own_words = {key: table[key] for key in _CONVENTIONS if key in table}
         entry = _read_entry(
             table,
             path.parent,
             where,
             {**columns, **own_columns},
-            replace(conventions, where=where, **words) if words else conventions,
+            Conventions(
+                **{**words, **own_words},
+                xg=ship.xg,
+                where=where,
+                installation=Installation.from_mapping(
+                    {**sensors, **own_sensors}, place
+                ),
+            ),
         )
         part = (*map(os.path.normpath, entry.paths), str(entry.cut))
         if part in entries:

@@ -3,10 +3,12 @@
 import math
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from shipgym.checks import quoted
 from shipgym.errors import InputError
 from shipgym.trials.clock_texts import zone_seconds
-from shipgym.trials.columns import Column, Locator
+from shipgym.trials.columns import Column
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.midship import to_project_conventions
 from shipgym.trials.plausibility.agreement import (
@@ -104,28 +106,26 @@ def _on_first_clock(other: Recording, first: Recording, known: Signals) -> Signa
         )
 
     shift = (other.start or 0.0) - (first.start or 0.0)
-    moved = {}
-    for name, (t, values) in other.signals.items():
-        moved[name] = Signal(t + shift, values)
-    _check_overlap(known, moved, other.locator)
+    moved = {
+        name: Signal(t + shift, values) for name, (t, values) in other.signals.items()
+    }
+    begin, end = _span(known)
+    other_begin, other_end = _span(moved)
+    if other_begin >= end or other_end <= begin:
+        column = other.locator.columns["t"].name
+        raise InputError(
+            f"{path}: expected a file of the same time as the other of this log, got"
+            f" one that begins {other_begin - begin:.6g} s after it and does not"
+            " overlap with it; name files that were written at the same time, or the"
+            f' zone of its clock: t = {{ column = "{column}", zone = "+02:00" }}'
+        )
     return moved
 
 
-def _check_overlap(known: Signals, moved: Signals, locator: Locator) -> None:
-    """Refuse a file that does not overlap in time with the others, all on one clock."""
-    spans = []
-    for signals in (known, moved):
-        clocks = [signal.t for signal in signals.values()]
-        spans.append((min(t[0] for t in clocks), max(t[-1] for t in clocks)))
-    (begin, end), (other_begin, other_end) = spans
-    if other_begin >= end or other_end <= begin:
-        zone = f't = {{ column = "{locator.columns["t"].name}", zone = "+02:00" }}'
-        raise InputError(
-            f"{locator.path}: expected a file of the same time as the other of this"
-            f" log, got one that begins {other_begin - begin:.6g} s after it and does"
-            " not overlap with it; name files that were written at the same time, or"
-            f" the zone of its clock: {zone}"
-        )
+def _span(signals: Signals) -> tuple[float, float]:
+    """First and last time of signals, s."""
+    times = np.concatenate([signal.t for signal in signals.values()])
+    return float(times.min()), float(times.max())
 
 
 def _turn(signals: Signals, name: str, zero: float = 0.0) -> None:

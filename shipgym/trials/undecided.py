@@ -4,38 +4,31 @@ import re
 from pathlib import Path
 from typing import Any
 
-from shipgym.files import LARGEST_TOML, read_text
+from shipgym.files import LARGEST_TOML, parse_toml, read_text, read_toml
 
-#: Stands in a ship file for a value that its reader has to choose.
-_LINE = re.compile(r'\s*([\w-]+)\s*=\s*"decide"(?:\s*#\s*DECIDE:\s*(.*))?')
+#: A line whose value its reader has to choose, with the choices behind it.
+_LINE = re.compile(
+    r'[ \t]*([\w.-]+)[ \t]*=[ \t]*"decide"[ \t]*(?:#[ \t]*DECIDE:[ \t]*(.*)|#.*)?'
+)
 
 
-def take_undecided(data: dict[str, Any], path: Path) -> tuple[str, ...]:
-    """Take values "decide" out of the tables of a ship file; a message for each.
+def read_decided(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Tables of a ship file without the values "decide", and a message for each.
 
     A message names the line of the file and, from its comment, the choices.
     """
-    tables = [data.get(name) for name in ("ship", "columns", "conventions", "sensors")]
-    trials = data.get("trials")
-    undecided = [
-        (table, key)
-        for table in (*tables, *(trials if isinstance(trials, list) else []))
-        if isinstance(table, dict)
-        for key, value in table.items()
-        if value == "decide"
-    ]
-    for table, key in undecided:
-        del table[key]
+    data = read_toml(path, "ship file")
+    lines = read_text(path, "ship file", LARGEST_TOML).splitlines()
     messages = []
-    text = read_text(path, "ship file", LARGEST_TOML) if undecided else ""
-    for number, line in enumerate(text.splitlines(), start=1):
-        match = _LINE.match(line)
+    for number, line in enumerate(lines, start=1):
+        match = _LINE.fullmatch(line)
         if match is not None:
             key, choices = match.groups("a value as in docs/ship_file.md")
             messages.append(
                 f"{path}: line {number}: {key}: expected a decision, got"
                 f' "decide"; write {choices.strip()}'
             )
-    if undecided and not messages:
-        messages = [f'{path}: expected decisions, got "decide"']
-    return tuple(messages)
+            lines[number - 1] = ""
+    if messages:
+        data = parse_toml("\n".join(lines), f"{path}:")
+    return data, tuple(messages)

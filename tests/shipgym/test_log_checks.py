@@ -143,7 +143,7 @@ def test_channels_at_different_rates_are_read_each_where_it_has_values(tmp_path)
     np.testing.assert_allclose(trial["u"], 1.0 + trial.t / 5.0)
     swapped = [rows[0], rows[1], rows[4], rows[3], rows[2], *rows[5:]]
     path.write_text("\n".join(["t,u,x", *swapped]))
-    assert "expected time to increase between values of 'x'" in refusal(path)
+    assert "expected time to increase from row to row" in refusal(path)
 
 
 def record(step):

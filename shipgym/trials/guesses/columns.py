@@ -5,6 +5,7 @@ import re
 from collections.abc import Collection, Iterable
 from fnmatch import fnmatchcase
 from functools import cache, lru_cache
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -148,9 +149,6 @@ def guess_columns(table: LogTable) -> list[ColumnGuess]:
         take(alone, "speed")
     if "t" in guesses:
         guesses["t"] = _with_date(table, guesses["t"], free)
-    heading = guesses.get("psi")
-    for channel in guesses.keys() & {*RUDDERS}:
-        guesses[channel] = _settled_rudder(table, guesses[channel], heading)
     return [guesses[channel] for channel in known if channel in guesses]
 
 
@@ -161,40 +159,20 @@ def _quaternion(table: LogTable, free: list[str]) -> ColumnGuess | None:
         match = re.fullmatch(r"(.*?)[\[_.]*([wxyz0-4])\]?", column.lower())
         if match:
             by_stem.setdefault(match[1], {})[match[2]] = column
-    for columns in by_stem.values():
-        for endings in _QUATERNIONS:
-            if not columns.keys() >= set(endings):
-                continue
-            w, *others = (columns[one] for one in endings)
-            parts = [table.likely_numbers(name) for name in (w, *others)]
-            if any(one is None for one in parts):
-                continue
-            values = np.array(parts, dtype=np.float64)
-            values = values[:, np.isfinite(values).all(axis=0)]
-            is_unit = np.abs(np.sum(values**2, axis=0) - 1.0) < 0.02
-            moves = np.ptp(values, axis=1).max() > 1e-6 if is_unit.size else False
-            if moves and is_unit.mean() > 0.99:
-                reason = "of a quaternion, whose four columns have length 1"
-                extra = (("quaternion", tuple(others)),)
-                return ColumnGuess("psi", w, "rad", reason, extra)
+    for columns, endings in product(by_stem.values(), _QUATERNIONS):
+        names = [columns[one] for one in endings if one in columns]
+        parts = [table.likely_numbers(name) for name in names]
+        known = [one for one in parts if one is not None]
+        if len(known) < 4:
+            continue
+        length = np.sum(np.square(known), axis=0)
+        is_unit = np.abs(length[np.isfinite(length)] - 1.0) < 0.02
+        moves = np.nanmax(np.nanstd(known, axis=1)) > 1e-6
+        if moves and is_unit.mean() > 0.99:
+            reason = "of a quaternion, whose four columns have length 1"
+            extra = (("quaternion", tuple(names[1:])),)
+            return ColumnGuess("psi", names[0], "rad", reason, extra)
     return None
-
-
-def _settled_rudder(
-    table: LogTable, guess: ColumnGuess, heading: ColumnGuess | None
-) -> ColumnGuess:
-    """A small rudder in degrees where the heading is and hardly changes."""
-    is_small = guess.unit == "rad" and guess.reason.startswith("from its size")
-    if not is_small or heading is None or heading.unit != "deg":
-        return guess
-    psi = table.likely_numbers(heading.column)
-    if psi is None:
-        return guess
-    turned = np.ptp(np.unwrap(psi[np.isfinite(psi)], period=360.0))
-    if turned > 10.0:
-        return guess
-    reason = f"{guess.reason}, with a heading in deg that changes by {turned:.3g} alone"
-    return guess._replace(unit="deg", reason=reason)
 
 
 def _first_match(
@@ -225,17 +203,16 @@ def _unit_where_fitting(table: LogTable, column: str, channel: str) -> UnitGuess
     name = _spaced(column)
     if _is_no_measurement(name, channel):
         return None
-    below = table.unit_row.get(column, "")
-    unit = None
-    unknown = unknown_unit(column.lower()) or unknown_unit(f"x [{below.lower()}]")
+    unit = unknown = None
     for text, reason in (
         (name, "from its name"),
-        (f"x [{_spaced(below)}]", "from the row of units"),
+        (f"x [{_spaced(table.unit_row.get(column, ''))}]", "from the row of units"),
     ):
         units = split_unit(text).units
         if names_another_quantity(units, channel):
             return None
         unit = named_unit(units, channel, reason) or unit
+        unknown = unknown or unknown_unit(text)
     if unit is None and unknown is not None:
         return UnitGuess(UNKNOWN, f"'{unknown}' is not known")
     if unit is None and channel == "t":
@@ -312,12 +289,6 @@ def _is_duration(
 
 def _with_date(table: LogTable, time: ColumnGuess, free: list[str]) -> ColumnGuess:
     """The time with the column of its date where there is one."""
-    stem = re.sub(r"secs?$", "", time.column, flags=re.IGNORECASE)
-    endings = ("nanosec", "nanosecs", "nsec", "nsecs")  # as in stamps of ROS
-    parts = {f"{stem}{ending}" for ending in endings if stem != time.column}
-    for part in parts.intersection(free):
-        free.remove(part)
-        return time._replace(extra=(("nanoseconds", part),))
     if not _TIME_OF_DAY.fullmatch(table.first_text(time.column)):
         return time
     for pattern in _column_names()["known"]["date"]:

@@ -61,24 +61,19 @@ def _two_propellers(numbers: dict[str, Floats]) -> Command | None:
             continue
         first, second = sides["port"], sides["starboard"]
         port, starboard = numbers[first], numbers[second]
-        if port.size == starboard.size and _turn_apart(port, starboard):
-            both = np.concatenate([port, starboard])
-            full = 2.0 * _SPAN
-            if not _is_pulse_width(both):
-                mean = float(np.mean(np.abs(both)))
-                full = float(f"{2.0 * mean:.2g}") or 1.0
-            reason = (
-                f"steering command: '{first}' minus '{second}', of which {full:g}"
-                " counts as 35 deg of a nominal rudder"
-            )
-            return Command(first, "deg", reason, (("minus", second), ("full", full)))
+        largest = max(np.abs(port).max(), np.abs(starboard).max())
+        if port.size != starboard.size or np.ptp(port - starboard) <= 0.01 * largest:
+            continue
+        both = np.concatenate([port, starboard])
+        full = 2.0 * _SPAN
+        if not _is_pulse_width(both):
+            full = float(f"{2.0 * np.mean(np.abs(both)):.2g}") or 1.0
+        reason = (
+            f"steering command: '{first}' minus '{second}', of which {full:g} counts as"
+            " 35 deg of a nominal rudder"
+        )
+        return Command(first, "deg", reason, (("minus", second), ("full", full)))
     return None
-
-
-def _turn_apart(port: Floats, starboard: Floats) -> bool:
-    """Return whether two propellers differ by more than a hundredth at times."""
-    largest = max(np.abs(port).max(), np.abs(starboard).max())
-    return bool(np.ptp(port - starboard) > 0.01 * largest)
 
 
 def _side(column: str) -> tuple[str, str]:

@@ -2,19 +2,16 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from shipgym.arrays import Floats
 from shipgym.checks import quoted, shown
 from shipgym.errors import InputError
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.guesses.columns import RUDDERS, ColumnGuess, guess_columns
 from shipgym.trials.guesses.speeds import settle_speeds
-from shipgym.trials.guesses.units import UNKNOWN, unit_by_size
+from shipgym.trials.guesses.units import UNKNOWN
 from shipgym.trials.readers.cell_texts import number_with_side
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable
@@ -165,14 +162,12 @@ def guess_trial(path: str | Path, *others: str | Path) -> TrialGuess:
         _guess_tables(guess)
     _take_frame(guess)
     guess.trial = _trial_by_proposals(guess)
-    if guess.trial is not None and guess.trial.channels.keys().isdisjoint(RUDDERS):
-        guess.decisions += _rudder_by_behaviour(guess)
     if guess.trial is None:
         guess.conventions = []
         return guess
-    is_turned = any(one.name == "rudder_positive" for one in guess.conventions)
-    guess.side = _rudder_side(guess, guess.trial, is_turned=is_turned)
-    if guess.side is not None and guess.side.side == "port" and not is_turned:
+    guess.side = _rudder_side(guess, guess.trial)
+    names = [one.name for one in guess.conventions]
+    if guess.side and guess.side.side == "port" and "rudder_positive" not in names:
         guess.take("rudder_positive", "port", guess.side.reason)
         guess.trial = guess.read()
     guess.conventions = [
@@ -200,17 +195,13 @@ def _trial_by_proposals(guess: TrialGuess) -> Trial | None:
         try:
             return guess.read()
         except InputError as error:
-            named = {one.channel for one in guess.columns if one.is_named}
-            found = {one.channel for one in guess.columns}
-            proposal = next(
-                (
-                    one
-                    for one in error.instead
-                    if one not in tried
-                    and (one[0] in found - named or one[0] not in QUANTITIES)
-                ),
-                None,
+            free = {one.channel for one in guess.columns if not one.is_named}
+            proposals = (
+                one
+                for one in error.instead
+                if one not in tried and (one[0] in free or one[0] not in QUANTITIES)
             )
+            proposal = next(proposals, None)
             if proposal is not None:
                 tried.add(proposal)
                 guess.take(*proposal, "without it the log is refused")
@@ -244,57 +235,29 @@ def _ask_for_missing(guess: TrialGuess) -> None:
         wanted |= {"psi": "heading", "delta": "rudder angle"}
     for channel, words in wanted.items():
         if channel not in known:
-            choices = _choices(guess, channel, words)
+            unit = "s" if channel == "t" else "deg"
+            choices = (
+                f"the column of the {words}, one of {quoted(guess.unused)[:1000]}, as"
+                f' {{ column = "...", unit = "{unit}" }}'
+            )
             guess.decisions.append(Decision("columns", channel, choices))
 
 
-def _rudder_by_behaviour(guess: TrialGuess) -> list[Decision]:
-    """A decision on the column that moves before the heading turns."""
-    for name in guess.unused:
-        values = (
-            guess.tables[0].likely_numbers(name) if len(guess.tables) == 1 else None
-        )
-        if values is None or not _behaves("delta", values):
-            continue
-        unit = unit_by_size(values, "delta").unit
-        reason = "as it moves before the heading turns"
-        column = ColumnGuess("delta", name, unit, reason)
-        try:
-            trial = replace(guess, columns=[*guess.columns, column]).read()
-        except InputError:
-            continue
-        if "psi" in trial and rudder_sign(trial.t, trial["psi"], trial["delta"]).side:
-            choices = f"likely the rudder, {column.reason}: {column.declaration}"
-            return [Decision("columns", "delta", choices)]
-    return []
-
-
-def _rudder_side(
-    guess: TrialGuess, trial: Trial, *, is_turned: bool
-) -> RudderSide | None:
-    """Side of the rudder in a log that was read, `is_turned` with positive to port.
-
-    None without a rudder or heading.
-    """
+def _rudder_side(guess: TrialGuess, trial: Trial) -> RudderSide | None:
+    """Side of the rudder by its letters or its turning; None without it or heading."""
     rudder = trial.channels.get("delta", trial.channels.get("delta_command"))
     if "psi" not in trial or rudder is None:
         return None
-    names = [one.column for one in guess.columns if one.channel in RUDDERS]
+    names = {one.column for one in guess.columns if one.channel in RUDDERS}
     for table in guess.tables:
-        for name in names:
-            if (
-                name in table.cells
-                and number_with_side(table.first_text(name)) is not None
-            ):
+        for name in names.intersection(table.header):
+            if number_with_side(table.first_text(name)) is not None:
                 return RudderSide("starboard", "the letters S and P of its values")
     found = rudder_sign(trial.t, trial["psi"], rudder)
     if found.side is None:
         return RudderSide(None, "the log does not tell")
-    if not is_turned:
-        return RudderSide(found.side, found.reason)
-    if found.side == "port":
-        return RudderSide(None, "two checks of the log contradict each other")
-    return RudderSide("port", found.reason)
+    is_turned = any(one.name == "rudder_positive" for one in guess.conventions)
+    return RudderSide("port" if is_turned else found.side, found.reason)
 
 
 def _unknown_units(columns: dict[str, ColumnGuess]) -> list[Decision]:
@@ -303,44 +266,14 @@ def _unknown_units(columns: dict[str, ColumnGuess]) -> list[Decision]:
     unknown = [one for one in columns.values() if one.unit == UNKNOWN]
     for guess in unknown:
         del columns[guess.channel]
-        usual = si_unit(guess.channel)
-        unit = f'unit = "{usual}" }} where that is its unit'
+        if guess.channel not in _NEEDED:
+            continue
+        unit = f'unit = "{si_unit(guess.channel)}" }} where that is its unit'
         if guess.channel in RUDDERS:
             unit = "full = 100 } where 100 of it are 35 deg of rudder"
         choices = (
             f"column {guess.quoted}, whose unit {guess.reason}:"
             f" {{ column = {guess.quoted}, {unit}"
         )
-        if guess.channel in _NEEDED:
-            decisions.append(Decision("columns", guess.channel, choices))
+        decisions.append(Decision("columns", guess.channel, choices))
     return decisions
-
-
-def _choices(guess: TrialGuess, channel: str, words: str) -> str:
-    """Free columns that behave as a channel does, or all free ones where none does."""
-    alike = []
-    for table in guess.tables:
-        for name in {*table.header}.intersection(guess.unused):
-            values = table.likely_numbers(name)
-            if values is not None and _behaves(channel, values):
-                alike.append(name)
-    names = [name for name in guess.unused if name in alike] or guess.unused
-    first = next(iter(names), words)
-    unit = "s" if channel == "t" else "deg"
-    column = f'{{ column = "{first}", unit = "{unit}" }}'
-    all_of_them = quoted(names)[:1000]
-    return f"the column of the {words}, one of {all_of_them}, as {column}"
-
-
-def _behaves(channel: str, values: Floats) -> bool:
-    """Return whether values behave as time, a heading or a rudder in degrees or rad."""
-    known = values[np.isfinite(values)]
-    if known.size < 3 or np.ptp(known) == 0.0:
-        return False
-    steps = np.diff(known)
-    if channel == "t":
-        return bool(np.mean(steps > 0.0) > 0.99)
-    largest = np.abs(known).max()
-    if channel == "psi":
-        return largest <= 720.0 and not np.all(steps > 0.0)  # as a number of rows does
-    return bool(known.min() < 0.0 < known.max() and largest <= 40.0)

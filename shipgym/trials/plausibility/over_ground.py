@@ -47,12 +47,11 @@ def check_over_ground(
     is_known = bool(conventions.installation.heading_offset)
     psi = log.channels["psi"][moving]
     course = np.angle(velocity[moving])
-    apart = np.exp(1j * (course - psi))
-    agreement = abs(apart.mean())
+    agreement = abs(np.exp(1j * (course - psi)).mean())
     mirrored = np.exp(1j * (course + psi)).mean()
     is_turning = np.ptp(psi) > 20.0 * DEGREE
     if is_turning and abs(mirrored) > max(0.95, agreement + 0.02):
-        _refuse_mirrored(mirrored, conventions, locator)
+        raise _mirrored(mirrored, conventions, locator)
     fault = _heading_fault(psi, course, offset_is_known=is_known)
     if fault:
         raise InputError(f"{locator.path}: expected a heading {fault}")
@@ -64,24 +63,21 @@ def check_over_ground(
     ]
 
 
-def _refuse_mirrored(
+def _mirrored(
     mirrored: complex, conventions: Conventions, locator: Locator
-) -> None:
-    """Refuse a heading that turns against the course, about north-east or else."""
+) -> InputError:
+    """Fault of a heading that turns against the course, about north-east or else."""
     largest_drift = 0.4  # rad
-    if abs(np.angle(mirrored * -1j)) > largest_drift:
-        raise InputError(
-            f"{locator.path}: expected a heading clockwise from north, got one that"
-            " contradicts the course over ground: it turns the other way; change the"
-            " sign of its column"
-        )
-    other = "ned" if conventions.frame == "enu" else "enu"
-    raise InputError(
-        f"{locator.path}: expected a heading that turns as the course over ground,"
-        " got one that turns the other way, and is its mirror image about"
-        f' north-east; write frame = "{other}" in [conventions], the frame of its'
-        " angles",
-        [("frame", other)],
+    remedy = "change the sign of its column"
+    proposals = []
+    if abs(np.angle(mirrored * -1j)) <= largest_drift:
+        frame = "ned" if conventions.frame == "enu" else "enu"
+        proposals = [("frame", frame)]
+        remedy = f'write frame = "{frame}" in [conventions], the frame of its angles'
+    return InputError(
+        f"{locator.path}: expected a heading clockwise from north, got one that"
+        f" contradicts the course over ground: it turns the other way; {remedy}",
+        proposals,
     )
 
 

@@ -10,13 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from shipgym.errors import InputError
-from shipgym.trials.readers.layout import (
-    Layout,
-    check_names,
-    layout_of_rows,
-    title_note,
-    unit_texts,
-)
+from shipgym.trials.readers.csv_file import read_csv
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.readers.text_files import check_unpacked
 
@@ -106,11 +100,9 @@ def _longest(column: Any) -> int:
 
 
 def read_excel(path: Path, content: bytes) -> LogTable:
-    """Read the first sheet of a workbook (.xlsx), with or without rows of title.
+    """Read the first sheet of a workbook (.xlsx) as the CSV file that it would be.
 
-    A row of units may stand below the names. Blank rows and columns are left out.
-    Raises InputError for a damaged or large file, and where a name is missing or
-    repeated.
+    Raises InputError for a damaged or large file, and as `read_csv` does.
     """
     remedy = "save the sheet again as .xlsx or as CSV"
     with damage_reported(path, "Excel (.xlsx)", remedy):
@@ -118,20 +110,5 @@ def read_excel(path: Path, content: bytes) -> LogTable:
         check_unpacked(path, sum(part.file_size for part in parts))
         pandas = import_module("pandas")
         sheet = pandas.read_excel(io.BytesIO(content), header=None, dtype=object)
-        frame = sheet.dropna(how="all").dropna(axis=1, how="all")
-        texts = frame.iloc[:100].map(str).where(frame.iloc[:100].notna(), "")
-        first_rows = dict(enumerate(texts.to_numpy().tolist()))
-        layout = layout_of_rows(first_rows) or Layout("", header=0)
-        names = [name.strip() for name in first_rows.get(layout.header, [])]
-        below = max(layout.header, *layout.units, 0) + 1
-        values = frame.iloc[below:]
-        header_at = 1 + int(frame.index[layout.header]) if names else 1
-        check_names(f"{path}: row {header_at}", names)
-        values.columns = names
-        units = [first_rows[number] for number in layout.units]
-        return replace(
-            read_frame(values.reset_index(drop=True), path),
-            rows=(values.index + 1).tolist(),
-            unit_row=unit_texts(names, units),
-            notes=tuple(title_note(header_at, layout.header, "row")),
-        )
+        text = sheet.dropna(axis=1, how="all").to_csv(header=False, index=False)
+        return replace(read_csv(path, text.encode()), place_words="row {line}")

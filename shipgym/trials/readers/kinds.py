@@ -5,13 +5,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from shipgym.errors import InputError
-from shipgym.files import shipped_toml
-from shipgym.trials.readers.calendar_columns import with_one_time
+from shipgym.files import LARGEST_CSV, read_bytes, shipped_toml
 from shipgym.trials.readers.csv_file import read_csv
 from shipgym.trials.readers.frames import read_excel, read_parquet
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.readers.matlab import read_matlab
-from shipgym.trials.readers.text_files import read_log_bytes
+from shipgym.trials.readers.messages import RAW_FRAME
 
 _READERS: dict[str, Callable[[Path, bytes], LogTable]] = {
     "csv": read_csv,
@@ -25,12 +24,8 @@ _MAGIC = {b"PAR1": "parquet", b"MATLAB 5.0": "matlab", b"MATLAB 7.3": "matlab"}
 #: of a file.
 _MESSAGES = re.compile(
     r"""^(?:[^\n]{0,200}[$!][A-Za-z0-9]{2}[A-Z]{3},
-    |[^\n]{0,80}\{[^\n]*"updates""?:
-    |[^\n]{0,80}\{[^\n]*"pgn":
-    |[^\n]{0,30}\d{4}-\d\d-\d\d\S+(?:,\d,\d{5,6},|\s+\d\s+\d+\s+\d+\s+\d{5,6}\s)
-    |[^\n]{0,40}can\d+\s+[0-9A-F]{8}(?:\#|\s+\[)
-    |\d\d:\d\d:\d\d\.\d+\ [RT]\ [0-9A-F]{8}\s
-    |A\d+\.\d+\ [0-9A-F]{5}\ [0-9A-F]{5}\s)""",
+    |[^\n]{0,80}\{[^\n]*"(?:updates""?|pgn"):
+    |[^\n]{0,30}\d{4}-\d\d-\d\d\S+\s+\d\s+\d+\s+\d+\s+\d{5,6}\s)""",
     re.MULTILINE | re.VERBOSE,
 )
 
@@ -47,7 +42,7 @@ def recognise_kind(path: Path, content: bytes) -> str:
         if content.startswith(magic):
             return kind
     beginning = content[:4096].decode("latin-1").replace("\r", "\n")
-    if len(_MESSAGES.findall(beginning)) >= 2:
+    if len([*_MESSAGES.findall(beginning), *RAW_FRAME.findall(beginning)]) >= 2:
         return "messages"
     _refuse_foreign(path, content)
     return "csv"
@@ -76,10 +71,10 @@ def read_log(path: str | Path | LogTable) -> LogTable:
     if isinstance(path, LogTable):
         return path
     path = Path(path)
-    content = read_log_bytes(path, "log")
+    content = read_bytes(path, "log", LARGEST_CSV)
     kind = recognise_kind(path, content)
     if kind == "messages":
         from shipgym.trials.readers.message_log import read_messages  # with its tables
 
         return read_messages(path, content)
-    return with_one_time(_READERS[kind](path, content))
+    return _READERS[kind](path, content)

@@ -147,16 +147,6 @@ def unit_texts(
     return units
 
 
-def title_note(header_at: int, count: int, what: str = "line") -> list[str]:
-    """A remark that lines of title are left out, where there are some."""
-    if not count:
-        return []
-    return [
-        f"the names of the columns are in {what} {header_at}: {count} {what}s of title"
-        " above are left out"
-    ]
-
-
 def is_data(cells: Sequence[str]) -> bool:
     """Return whether at least half of the cells with something are values."""
     filled = [cell for cell in cells if not is_missing(cell)]

@@ -12,9 +12,9 @@ from shipgym.trials.units import UNITS
 
 _TAG = re.compile(r"[\\,]c:(\d{9,14}(?:\.\d+)?)")
 _CLOCK = re.compile(
-    r"(?<!\d)(?P<date>\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4})?[-T ,;_Z]*"
-    r"(?P<time>\d\d?:\d\d:\d\d(?:[.,]\d+)?)"
-    r" ?(?P<zone>Z|UTC|[+-]\d\d:?\d\d)?"
+    r"(?<!\d)(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4})?[-T ,;_Z]*"
+    r"(\d\d?:\d\d:\d\d(?:[.,]\d+)?)"
+    r" ?(Z|UTC|[+-]\d\d:?\d\d)?"
 )
 #: Seconds or fractions of them since 1970, or seconds with decimals since some start.
 _NUMBER = re.compile(r"(?<![\w.:/-])A?(\d{9,19}(?:\.\d+)?|\d+\.\d+)(?![\w.:/])")
@@ -30,22 +30,14 @@ def stamp_text(before: str) -> str:
     if tag is not None:
         return tag[1]
     clock = _CLOCK.search(before)
-    if clock is not None:
-        return clock_text_of(clock)
-    number = _NUMBER.search(before)
-    return "" if number is None else number[1]
-
-
-def clock_text_of(match: re.Match[str]) -> str:
-    """Date, time and zone, one blank apart, as `read_clock` reads them."""
-    date = match["date"] or ""
-    zone = match["zone"] or ""
+    if clock is None:
+        number = _NUMBER.search(before)
+        return "" if number is None else number[1]
+    date, time, zone = clock.groups("")
     if date[:4].isdigit():
         date = re.sub("[/.]", "-", date)
-    time = match["time"].replace(",", ".")
     zone = "" if zone in ("Z", "UTC") or not date else zone
-    text = f"{date} {time}{zone}"
-    return text.strip()
+    return f"{date} {time.replace(',', '.')}{zone}".strip()
 
 
 def read_stamps(texts: Sequence[str]) -> Floats:

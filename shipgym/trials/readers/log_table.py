@@ -153,30 +153,29 @@ class LogTable:
         """
         cells = dict(self.cells)
         notes = []
+
+        def note(name: str, odd: list[int], what: str) -> None:
+            found = str(self.cells[name][odd[0]]).strip() or "nothing"
+            more = f", as in {len(odd) - 1} more" if len(odd) > 1 else ""
+            notes.append(f"{self.cell(odd[0], name)}: {found!r} is no {what}{more}")
+
         for name in names:
             parsed = self._parse(name)
             if name != time and parsed.odd and parsed.is_likely:
                 cells[name] = parsed.numbers
-                notes.append(self._odd_note(name, parsed.odd, "number"))
+                note(name, parsed.odd, "number")
         rows = self.rows
         odd = self._odd_times(time)
-        most = max(1.0, ODD_SHARE * len(rows))
-        if 0 < len(odd) <= most:
-            notes.append(self._odd_note(time, odd, "time, the row is left out"))
+        if 0 < len(odd) <= max(1.0, ODD_SHARE * len(rows)):
+            note(time, odd, "time, the row is left out")
             cells = {name: np.delete(column, odd) for name, column in cells.items()}
             rows = np.delete(rows, odd).tolist()
         return replace(self, cells=cells, rows=rows, notes=(*self.notes, *notes))
 
-    def _odd_note(self, name: str, odd: list[int], what: str) -> str:
-        found = str(self.cells[name][odd[0]]).strip() or "nothing"
-        more = f", as in {len(odd) - 1} more" if len(odd) > 1 else ""
-        return f"{self.cell(odd[0], name)}: {found!r} is no {what}{more}"
-
     def _odd_times(self, name: str) -> list[int]:
         """Rows whose time is missing, or is neither a number nor a clock time."""
         numbers, odd = self._parse(name)
-        is_missing = np.isnan(numbers)
-        missing = np.flatnonzero(is_missing).tolist()
+        missing = np.flatnonzero(np.isnan(numbers)).tolist()
         if len(odd) <= ODD_SHARE * len(numbers):
             return missing
         texts = self.texts(name)  # clock times

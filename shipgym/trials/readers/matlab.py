@@ -22,18 +22,13 @@ _HEADER_BYTES = 128
 #: Types of elements: matrices, compressed ones, and those of numbers as numpy names
 #: them.
 _MATRIX, _COMPRESSED = 14, 15
-_NUMBER_TYPES = {
-    1: "i1",
-    2: "u1",
-    3: "i2",
-    4: "u2",
-    5: "i4",
-    6: "u4",
-    7: "f4",
-    9: "f8",
-    12: "i8",
-    13: "u8",
-}
+_NUMBER_TYPES = dict(
+    zip(
+        (1, 2, 3, 4, 5, 6, 7, 9, 12, 13),
+        ["i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8", "i8", "u8"],
+        strict=True,
+    )
+)
 #: In the flags of a matrix: the class, the first of the numeric ones, complex numbers.
 _CLASS, _FIRST_NUMERIC, _COMPLEX = 0xFF, 6, 0x0800
 _MOST_MATRICES = 10_000  # a file of zeros holds millions of empty ones
@@ -69,40 +64,39 @@ def _all_vectors(path: Path, content: bytes) -> dict[str, Any]:
             " save(..., '-v7')"
         )
     vectors: dict[str, Any] = {}
-    order = "<" if header.endswith(b"IM") else ">"
     remedy = "save the vectors again with save(..., '-v7')"
     with damage_reported(path, "MATLAB (.mat)", remedy):
-        matrices = _matrices(path, content[_HEADER_BYTES:], order)
+        matrices = _matrices(path, content[_HEADER_BYTES:])
         for matrix in islice(matrices, _MOST_MATRICES):
-            vectors |= _vectors(matrix, order)
+            vectors |= _vectors(matrix)
     return vectors
 
 
-def _matrices(path: Path, content: bytes, order: str) -> Iterator[bytes]:
-    """Contents of the matrices of a file, unpacked; `order` is "<" or ">"."""
+def _matrices(path: Path, content: bytes) -> Iterator[bytes]:
+    """Contents of the matrices of a file, unpacked."""
     unpacked = 0
-    for kind, element in _elements(content, order):
+    for kind, element in _elements(content):
         if kind == _COMPRESSED:
             unpacker = zlib.decompressobj()
             just_too_many = LARGEST_UNPACKED + 1 - unpacked
             inner = unpacker.decompress(element, just_too_many)
             unpacked += len(inner)
             check_unpacked(path, unpacked)
-            kind, element = next(_elements(inner, order))
+            kind, element = next(_elements(inner))
         if kind == _MATRIX:
             yield element
 
 
-def _vectors(matrix: bytes, order: str) -> dict[str, Any]:
+def _vectors(matrix: bytes) -> dict[str, Any]:
     """Numbers of a numeric matrix by its name, of one with columns by their numbers."""
-    parts = list(islice(_elements(matrix, order), 4))
+    parts = list(islice(_elements(matrix), 4))
     if len(parts) < 4 or parts[3][0] not in _NUMBER_TYPES:
         return {}
     (_, flags), (_, shape), (_, name), (number_type, numbers) = parts
-    values = np.frombuffer(numbers, order + _NUMBER_TYPES[number_type])
-    sizes = np.frombuffer(shape, f"{order}i4")
+    values = np.frombuffer(numbers, _NUMBER_TYPES[number_type])
+    sizes = np.frombuffer(shape, "<i4")
     is_table = sizes.size == 2 and np.prod(sizes) == values.size
-    about, *_ = np.frombuffer(flags, f"{order}u4")
+    about, *_ = np.frombuffer(flags, "<u4")
     if not is_table or (about & _CLASS) < _FIRST_NUMERIC or about & _COMPLEX:
         return {}
     return _columns(name.decode("ascii"), values.reshape(sizes, order="F"))
@@ -131,12 +125,12 @@ def _columns(name: str, array: Any) -> dict[str, Any]:
     }
 
 
-def _elements(content: bytes, order: str) -> Iterator[tuple[int, bytes]]:
+def _elements(content: bytes) -> Iterator[tuple[int, bytes]]:
     """Elements one after another, by type, each with a tag of eight bytes."""
     tag_bytes = 8
     at = 0
     while at + tag_bytes <= len(content):
-        kind, size = struct.unpack_from(f"{order}II", content, at)
+        kind, size = struct.unpack_from("<II", content, at)
         small_size = kind >> 16  # of an element within its own tag
         if small_size:
             begin = at + 4

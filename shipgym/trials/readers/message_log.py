@@ -30,7 +30,7 @@ def read_messages(path: Path, content: bytes) -> LogTable:
     Of several sources of a channel the best is taken, and a note names the others.
     Raises InputError for a damaged log and one without time or channels.
     """
-    lines, _ = text_lines(path, content)
+    lines = text_lines(path, content)
     heard = Heard()
     hear_sentences(lines, heard)
     with placed(str(path)):
@@ -38,25 +38,16 @@ def read_messages(path: Path, content: bytes) -> LogTable:
     hear_deltas(lines, heard)
     notes = _check_damage(path, heard) + heard.notes
     clock = log_clock(path, heard, notes) if heard.count else None
-    of_motion = [name for name in heard.channels if not is_wind(name)]
-    fault = ""
     if not heard.count and any("!AIVD" in line for line in lines):
-        fault = (
-            "this looks like a log of AIS: positions of other ships, without their"
-            " rudders; expected the own ship's sentences (RMC, HDT, RSA)"
+        raise InputError(
+            f"{path}: this looks like a log of AIS: positions of other ships, without"
+            " their rudders; expected the own ship's sentences (RMC, HDT, RSA)"
         )
-    elif clock is None:
-        fault = (
-            "expected sentences with a time (RMC, GGA, GLL or ZDA) or a time before"
-            " each line"
+    if clock is None:
+        raise InputError(
+            f"{path}: expected sentences with a time (RMC, GGA, GLL or ZDA) or a time"
+            " before each line, got none; log these too"
         )
-    elif not set(of_motion) - {"variation"}:
-        fault = (
-            "expected sentences of a ship's motion (RMC, HDT, HDG, ROT, RSA and others)"
-        )
-    if clock is None or fault:
-        raise InputError(f"{path}: {fault}, got none; log these too")
-
     chosen = choose_tracks(heard, clock)
     tracks = dict(chosen.by_channel)
     winds = {name: tracks.pop(name) for name in chosen.by_channel if is_wind(name)}
@@ -65,7 +56,8 @@ def read_messages(path: Path, content: bytes) -> LogTable:
     notes += chosen.notes
     if not tracks:
         raise InputError(
-            f"{path}: expected several values of a ship's motion, got too few: log more"
+            f"{path}: expected several values of a ship's motion (RMC, HDT, HDG, ROT,"
+            " RSA and others), got too few: log these too"
         )
     return _table(path, tracks, notes, magnetic=chosen.magnetic)
 

@@ -1,5 +1,6 @@
 """Messages of a bus or a recorder, whatever their form, by channel and source."""
 
+import re
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,6 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from shipgym.trials.readers.line_stamps import stamp_text
+
+#: A raw frame of NMEA 2000 in a line: as canboat, candump and the gateways of Yacht
+#: Devices and Actisense write it.
+RAW_FRAME = re.compile(
+    r"\d{4}-\d\d-\d\d[^,\s]+,\d,\d{5,6},|can\d+\s+[0-9A-F]{8}(?:#|\s+\[)"
+    r"|\d\d:\d\d:\d\d\.\d+ [RT] [0-9A-F]{8}\s|A\d+\.\d+ [0-9A-F]{5} [0-9A-F]{5}\s"
+)
 
 
 class Value(NamedTuple):

@@ -2,7 +2,7 @@
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
@@ -42,7 +42,7 @@ def hear_deltas(lines: Sequence[str], heard: Heard) -> None:
             heard.count += 1
             heard.damaged.append(number)
 
-    own = _own_context(lines, deltas.values())
+    own = _own_context(deltas.values())
     others = 0
     for number, delta in deltas.items():
         if delta.get("context", own) == own:
@@ -64,16 +64,12 @@ def _delta(line: str) -> dict[str, Any]:
     return delta
 
 
-def _own_context(lines: Sequence[str], deltas: Any) -> str:
-    """The vessel that logs: as the server says, or whose data are the most."""
-    for line in lines[:10]:
-        if '"self"' in line and '"updates"' not in line:
-            return str(json.loads(line[line.index("{") :])["self"])
+def _own_context(deltas: Iterable[Mapping[str, Any]]) -> str:
+    """The vessel that logs: "self", or whose rudder is told, or with most data."""
     counts = Counter[str]()
     for delta in deltas:
-        paths = {path for path, *_ in _values(delta)}
-        is_own = paths & {"steering.rudderAngle", "navigation.headingTrue"}
-        counts[delta.get("context", "vessels.self")] += 1 + 1000 * len(is_own)
+        has_rudder = any(path == "steering.rudderAngle" for path, *_ in _values(delta))
+        counts[delta.get("context", "vessels.self")] += 1 + 1000 * has_rudder
     if not counts or "vessels.self" in counts:
         return "vessels.self"
     return max(counts, key=counts.__getitem__)
@@ -90,20 +86,20 @@ def _values(delta: Mapping[str, Any]) -> Iterator[tuple[str, Any, Mapping[str, A
 def _hear(line: int, delta: Mapping[str, Any], heard: Heard) -> None:
     """Add the channels of a delta, each path a source of its own."""
     for path, content, update in _values(delta):
+        numbers: dict[str, Any] = {_PATHS.get(path, ""): content}
         if path == "navigation.position" and isinstance(content, dict):
-            numbers: dict[str, Any] = {
-                "lat": content.get("latitude"),
-                "lon": content.get("longitude"),
-            }
-        elif path in _PATHS:
-            numbers = {_PATHS[path]: content}
-        else:
-            continue
-        if all(
-            type(one) in (int, float) and np.isfinite(one) for one in numbers.values()
-        ):
-            source = f"{path} of {_sender(update)}"
-            heard.hear(line, source, numbers, _time(update.get("timestamp")))
+            numbers = {"lat": content.get("latitude"), "lon": content.get("longitude")}
+        is_known = "" not in numbers
+        if is_known and all(_is_number(one) for one in numbers.values()):
+            source = update.get("$source", update.get("source"))
+            if isinstance(source, dict):
+                source = f"{source.get('label')}.{source.get('src')}"
+            time = _time(update.get("timestamp"))
+            heard.hear(line, f"{path} of {source}", numbers, time)
+
+
+def _is_number(value: Any) -> bool:
+    return type(value) in (int, float) and bool(np.isfinite(value))
 
 
 def _time(text: Any) -> float:
@@ -113,11 +109,3 @@ def _time(text: Any) -> float:
     except ValueError:
         return np.nan
     return moment.replace(tzinfo=moment.tzinfo or UTC).timestamp()
-
-
-def _sender(update: Mapping[str, Any]) -> str:
-    source = update.get("$source", update.get("source"))
-    if not isinstance(source, dict):
-        return str(source)
-    parts = [source.get(key) for key in ("label", "talker", "sentence", "src", "pgn")]
-    return ".".join(str(part) for part in parts if part is not None)
