@@ -92,6 +92,7 @@ TRIED: dict[str, tuple[str | tuple[str, ...], ...]] = {
         ("--help",),
         ("doctor",),
         ("identify", SHIP, "--out", "ship"),
+        ("reproduce", "cao2015"),
     ),
     "report": (("trials", "mariner", "--draws", "0", "--out", "trials.html"),),
     "benchmark": ((*BENCHMARK, "results"),),

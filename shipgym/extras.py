@@ -53,3 +53,8 @@ def library(name: str, extra: str, use: str = "") -> Any:
         if use:
             missing += f", {use}"
         raise InputError(f"{missing}: pip install 'shipgym[{extra}]'") from error
+
+
+def axes_of(ax: Any = None) -> Any:
+    """Axes of matplotlib: those given, or the current ones."""
+    return ax or library("matplotlib.pyplot", "report", "plots need it").gca()

@@ -19,6 +19,7 @@ import shutil
 import sys
 import traceback
 import types
+from importlib import import_module
 from pathlib import Path
 
 import document_api
@@ -45,7 +46,7 @@ PAGES = [
     if "```python" in path.read_text(encoding="utf-8")
 ]
 #: Pages that take few steps, for which loops are not worth compiling.
-PLAIN = "docs/environments/"
+PLAIN = ("docs/environments/", "docs/gallery.md")
 SMALLER = {
     "num_envs=1024": "num_envs=3",
     "learn(20_000)": "learn(64)",
@@ -117,6 +118,17 @@ def test_the_reference_has_every_public_name():
         for path in (ROOT / "docs" / "api").glob("*.md")
     }
     assert written == document_api.pages()
+
+
+def test_every_name_of_a_package_but_constants_has_an_entry():
+    text = "".join(document_api.pages().values())
+    described = {entry.rpartition(".")[2] for entry in re.findall("::: (.*)", text)}
+    assert described >= {"LSSVM", "RMSVM", "LQ", "LQG", "PID", "MPC"}
+    packages = [name for page in document_api.PACKAGES.values() for name in page]
+    public = {name for one in packages for name in import_module(one).__all__}
+    colours = {"LIMIT", "MEASURED", "MODEL", "MUTED", "PALETTE"}
+    constants = {"AIR_DENSITY", "CHANNEL_AXES", "manoeuvres"}
+    assert public - described == colours | constants
 
 
 def test_the_table_of_ids_is_that_of_the_environments():

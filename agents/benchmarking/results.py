@@ -27,8 +27,9 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_fields, check_format
 from shipgym.drafts import atomic_path
 from shipgym.errors import InputError
-from shipgym.extras import library
+from shipgym.extras import axes_of, library
 from shipgym.files import make_folder, read_json, write_json
+from shipgym.plots import MODEL
 
 RESULTS, EPISODES, PARTS = "results.json", "episodes.parquet", "parts"
 FORMAT, KIND = 4, "shipgym-benchmark"
@@ -123,6 +124,29 @@ class BenchmarkResult:
                     place = {"controller": name, "task": task, "set": on}
                     rows.append(place | _figures(cell))
         return pd.DataFrame(rows)
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the ranking on axes of matplotlib, and return these.
+
+        Scores on the ship with their 95 % intervals, those of the first part of the
+        suite that has any.
+
+        ax : matplotlib.axes.Axes, optional
+            By default the current ones.
+        """
+        ax = axes_of(ax)
+        for totals in self.summary["ranking"].values():
+            scores = {one["name"]: one["scores"].get("ship") for one in totals}
+            shown = {name: score for name, score in scores.items() if score}
+            if not shown:
+                continue
+            for name, score in shown.items():
+                ax.plot([score["low"], score["high"]], [name, name], color=MODEL)
+                ax.plot([score["value"]], [name], "o", color=MODEL)
+            break
+        ax.set_xlabel("score: cost of the rule over that of the controller")
+        ax.invert_yaxis()
+        return ax
 
     def save(self, folder: str | Path) -> Self:
         """Write `episodes.parquet` and then `results.json`, each whole or not at all.

@@ -270,7 +270,7 @@ def look_command(
     from agents.output import check_page
     from shipgym.errors import InputError
     from shipgym.files import write_text
-    from shipgym.pages.look import declared_reading, look_page
+    from shipgym.pages.look import declared_reading, look_page, verdict
     from shipgym.trials.guesses import guess_trial
     from shipgym.trials.ship_file import ShipFile
 
@@ -293,6 +293,8 @@ def look_command(
         remarks = [one.choices for one in guess.decisions]
 
     write_text(look_page(log.name, trials, readings, remarks), out)
+    headline, _ = verdict(trials, remarks)
+    say(headline)
     fields = []
     for trial, reading in zip(trials, readings, strict=True):
         fields.append(
@@ -315,5 +317,6 @@ def look_command(
             warn(f"{trial.name}: {note}")
     for remark in remarks:
         warn(remark)
-    answer({"written": str(out), "trials": fields, "to_decide": remarks})
+    found = {"written": str(out), "verdict": headline, "trials": fields}
+    answer({**found, "to_decide": remarks})
     say(f"written: {out}")

@@ -1,4 +1,4 @@
-"""`shipgym reproduce`: the papers' tables, run from a checkout."""
+"""`shipgym reproduce`: the papers' tables."""
 
 import os
 import subprocess
@@ -9,9 +9,9 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from agents.cli.command import WRONG_INPUT, fail
-
-SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "reproduce.py"
+HERE = Path(__file__).resolve()
+#: In the wheel beside this package (setup.py), in a checkout in its scripts.
+PLACES = HERE.parents[1] / "scripts", HERE.parents[2] / "scripts"
 
 
 def reproduce_command(
@@ -36,17 +36,12 @@ def reproduce_command(
     """Reproduce the papers' tables.
 
     Shows the printed numbers, ours by the paper's method and at best, and whether the
-    aim is met. Needs a checkout of the project. Exits with 1 if an aim is missed.
+    aim is met. Exits with 1 if an aim is missed.
     """
     from agents.cli.terminal import AS_JSON, console
 
-    if not SCRIPT.is_file():
-        fail(
-            "the papers' tables are not part of the installed package: in a checkout of"
-            f" the project run python scripts/reproduce.py {paper}",
-            WRONG_INPUT,
-        )
-    arguments = [sys.executable, str(SCRIPT), paper]
+    folder = next(place for place in PLACES if place.is_dir())
+    arguments = [sys.executable, str(folder / "reproduce.py"), paper]
     options = {"--markdown": markdown, "--table": table, "--row": row}
     for option, value in options.items():
         if value is not None:

@@ -63,9 +63,8 @@ def metrics(run: Rollout) -> dict[str, Floats]:
     for name in run.task.constraints:
         broken = during(run, CONSTRAINT + name) > 0.0
         intervals = total(broken)
-        violated[f"violated_{name}"] = ratio(intervals, run.steps)
-    terminated = lost.astype(np.float64)
-    failed = run.failed.astype(np.float64)
+        share = ratio(intervals, run.steps)
+        violated[f"violated_{name}"] = share
     heel = nowhere  # of a ship without roll
     if "phi" in run.histories:
         angles = np.abs(during(run, "phi"))
@@ -79,8 +78,8 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         "heel_deg": heel,
         "speed_lost_percent": speed_lost(run),
         "extrapolating": mean(run, "extrapolating"),
-        "terminated": terminated,
-        "failed": failed,
+        "terminated": lost.astype(np.float64),
+        "failed": run.failed.astype(np.float64),
     }
 
 
@@ -174,7 +173,8 @@ def speed_lost(run: Rollout) -> Floats:
 
 def path_following(run: Rollout) -> dict[str, Floats]:
     """Figures of path following of each episode, see `metrics`."""
-    outside = run.sailing & (during(run, "in_corridor") == 0.0)
+    is_outside = during(run, "in_corridor") == 0.0
+    outside = run.sailing & is_outside
     return {
         "cross_track_rmse_m": root_mean_square(run, "cross_track"),
         "outside_corridor": ratio(total(outside), run.steps),

@@ -133,10 +133,13 @@ def _look(engine: Engine, recorded: Collection[str]) -> Histories:
     if not recorded:
         return {}
     states = engine.physical_state()
-    found = {name: np.array(states[name]) for name in recorded if name in states}
-    for name in engine.task.info_names:
-        if name in recorded:
+    infos = engine.task.info_names
+    found = {}
+    for name in recorded:
+        if name in infos:
             found[name] = engine.info(name).copy()
+        elif name in states:
+            found[name] = np.array(states[name])
     return found
 
 

@@ -20,7 +20,7 @@ from shipgym.models.catalogue import grey_box
 if TYPE_CHECKING:  # whoever shares work out does without
     from shipgym.envs.engine import Engine
     from shipgym.envs.randomisation import Randomisation
-    from shipgym.tasks.task import Observed, Task
+    from shipgym.tasks.task import Task
 
 #: Seeds of the episodes that are scored; training and tuning use smaller ones.
 FIRST_SEED = 1_000_000
@@ -37,9 +37,10 @@ class Scenario(NamedTuple):
     task: Task
     randomisation: Randomisation
 
-    def observed(self) -> tuple[Observed, ...]:
-        """Return what the task shows of the ship."""
-        return self.task.observed(self.ship)
+    def scales(self) -> list[tuple[str, float]]:
+        """Return what the task shows of the ship, and in which units."""
+        shown = self.task.observed(self.ship)
+        return [(one.name, one.scale) for one in shown]
 
 
 @dataclass(frozen=True)
@@ -102,11 +103,9 @@ class BenchmarkTask:
 
         Raises InputError, also for an unknown model, ship or option.
         """
-        designed, steered = (
-            [(shown.name, shown.scale) for shown in scenario.observed()]
-            for scenario in (self.design, self.scenario("ship"))
-        )
-        if designed != steered:
+        expected = self.design.scales()
+        steered = self.scenario("ship")
+        if steered.scales() != expected:
             raise InputError(
                 f"task '{self.name}': ship: expected the particulars of '{self.model}',"
                 f" got '{self.true_ship}', whose observations are shown in other units"

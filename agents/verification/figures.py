@@ -18,11 +18,9 @@ from shipgym.plots import (
     Panel,
     axis,
     line,
-    panels,
     points,
     translucent,
 )
-from shipgym.plots.style import Figure
 
 PILOT_COLOURS = ("#0f8a7e", "#a1478f", "#d9822b", "#6b7a1e", "#3b5b92", "#8c564b")
 CRITERIA = {
@@ -60,28 +58,28 @@ def band(t: Floats, values: Floats, name: str, colour: str, **more: Any) -> Any:
     )
 
 
-def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
+def criteria_panel(criteria: Mapping[str, Criterion]) -> Panel:
     """Criteria of every draw in per cent of their limits, a row each."""
     jitter = np.random.default_rng(0)
     traces = []
     names = []
     for row, (name, criterion) in enumerate(criteria.items()):
-        traces.append(_draws_of(criterion, row, jitter))
-        traces += _marks_of(criterion, row)
+        dots = _draws_of(criterion, row, jitter)
+        marks = _marks_of(criterion, row)
+        traces += [dots, *marks]
         names.append(criterion_name(name, criterion))
     ends = [-0.5, len(criteria) - 0.5]
     traces.append(_limit_line(ends))
 
+    rows = range(len(names))
     names_axis = axis(
-        tickvals=list(range(len(names))),
+        tickvals=list(rows),
         ticktext=names,
         range=ends[::-1],
         showgrid=False,
     )
     shares_axis = axis("per cent of the limit", rangemode="tozero", ticksuffix=" %")
-    panel = Panel(traces, shares_axis, names_axis)
-    height = 46 * len(criteria) + 100
-    return panels([panel], height, left=190, hovermode="closest")
+    return Panel(traces, shares_axis, names_axis)
 
 
 def _limit_line(heights: list[float]) -> Any:
@@ -124,14 +122,9 @@ def _marks_of(criterion: Criterion, row: int) -> list[Any]:
     return marks
 
 
-def _side_by_side(left: Panel, right: Panel) -> Figure:
-    grid = {"horizontal_spacing": 0.1}
-    return panels([left, right], 430, 2, grid=grid, hovermode="closest")
-
-
-def steps_figure(
+def step_panels(
     t: Floats, responses: Mapping[str, tuple[Floats, Floats]], step_deg: float
-) -> Figure:
+) -> tuple[Panel, Panel]:
     """Change of course under each autopilot: heading above, rudder below.
 
     `t`: s, shape (n_samples,); `responses`: by autopilot heading and rudder, each of
@@ -147,12 +140,10 @@ def steps_figure(
 
     headings.append(_set_course(t, step_deg))
     rudder_axis = axis("rudder, deg", zero=True)
-    shown = [
-        Panel(headings, "", "heading change, deg"),
+    return (
+        Panel(headings, "time, s", "heading change, deg"),
         Panel(rudders, "time, s", rudder_axis),
-    ]
-    grid = {"shared_xaxes": True, "vertical_spacing": 0.06, "row_heights": [0.58, 0.42]}
-    return panels(shown, 500, grid=grid)
+    )
 
 
 def _set_course(t: Floats, step_deg: float) -> Any:
@@ -172,7 +163,7 @@ def _step_lines(t: Floats, angles: Floats, name: str, colour: str) -> list[Any]:
     return [of_draws, own]
 
 
-def tracks_figure(tracks: Mapping[str, Track], length: float) -> Figure:
+def track_panels(tracks: Mapping[str, Track], length: float) -> tuple[Panel, Panel]:
     """Tracks of the identified model under each path autopilot, and their errors."""
     first = next(iter(tracks.values()))
     waypoints = _path_line(
@@ -189,10 +180,11 @@ def tracks_figure(tracks: Mapping[str, Track], length: float) -> Figure:
         errors.append(_error_line(track, length, name, colour))
 
     north_axis = axis("north, ship lengths", scaleanchor="x", scaleratio=1)
-    left = Panel(paths, "east, ship lengths", north_axis, "Track")
     aside = axis("m, positive to starboard", zero=True)
-    right = Panel(errors, "way, ship lengths", aside, "Cross-track error")
-    return _side_by_side(left, right)
+    return (
+        Panel(paths, "east, ship lengths", north_axis, "Track"),
+        Panel(errors, "way, ship lengths", aside, "Cross-track error"),
+    )
 
 
 def _path_line(

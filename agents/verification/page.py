@@ -8,7 +8,6 @@ import numpy as np
 
 import shipgym
 from agents.controllers.controller import Controller
-from agents.verification import figures
 from agents.verification.figures import criterion_name
 from agents.verification.result import STEP_DEG, AutopilotResult, Verification
 from identification import IdentificationResult
@@ -17,6 +16,7 @@ from identification.report.view import fit_view, trial_figures
 from shipgym.files import write_text
 from shipgym.manoeuvres import Criterion
 from shipgym.pages import NONE, fixed, number, render
+from shipgym.plots import panels
 
 #: Name and unit of each margin.
 MARGINS = {
@@ -187,17 +187,23 @@ def result_figures(
     fit: IdentificationResult, found: Verification, length: float
 ) -> dict[str, Any]:
     """Figures of an identification and a verification by name."""
-    responses = {}
-    for pilot in found.by_name:
-        step = pilot.step
-        responses[pilot.name] = (step.heading, step.rudder)
-    t = found.pilots[0].step.t
+    drawn = found.panels(length)
+    criteria = drawn["criteria"]
+    n_criteria = len(found.criteria)
+    height = 46 * n_criteria + 100
+    grid = {
+        "shared_xaxes": True,
+        "vertical_spacing": 0.06,
+        "row_heights": [0.58, 0.42],
+    }
+    steps = [drawn["heading"], drawn["rudder"]]
     shown = {
         **trial_figures(fit),
-        "criteria": figures.criteria_figure(found.criteria),
-        "steps": figures.steps_figure(t, responses, STEP_DEG),
+        "criteria": panels([criteria], height, left=190, hovermode="closest"),
+        "steps": panels(steps, 500, outer=True, grid=grid),
     }
     if found.tracks:
-        tracks = {track.key.upper(): track for track in found.tracks}
-        shown["track_keeping"] = figures.tracks_figure(tracks, length)
+        both = [drawn["track"], drawn["cross-track error"]]
+        grid = {"horizontal_spacing": 0.1}
+        shown["track_keeping"] = panels(both, 430, 2, grid=grid, hovermode="closest")
     return shown

@@ -9,13 +9,16 @@ import numpy as np
 
 from agents.controllers.controller import Controller
 from agents.rollouts.course_keeping import Episodes, StepResponses
+from agents.verification.figures import criteria_panel, step_panels, track_panels
 from agents.verification.tracks import Track
 from identification import IdentificationResult
 from shipgym.arrays import Flags, finite
+from shipgym.checks import check_choice
 from shipgym.manoeuvres import Criterion
 from shipgym.manoeuvres.quantiles import upper_95
 from shipgym.models import ShipModel
 from shipgym.models.linear import Nomoto
+from shipgym.plots import Panel, draw
 from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial
 
@@ -82,6 +85,21 @@ class Verification:
         """Autopilots in an order apart from the ranking, for their colours."""
         return sorted(self.pilots, key=lambda pilot: pilot.name, reverse=True)
 
+    def panels(self, length: float) -> dict[str, Panel]:
+        """Panels of figures by name; `length`: of the ship, m."""
+        responses = {}
+        for pilot in self.by_name:
+            responses[pilot.name] = (pilot.step.heading, pilot.step.rudder)
+        t = self.pilots[0].step.t
+        heading, rudder = step_panels(t, responses, STEP_DEG)
+        criteria = criteria_panel(self.criteria)
+        shown = {"criteria": criteria, "heading": heading, "rudder": rudder}
+        if self.tracks:
+            tracks = {track.key.upper(): track for track in self.tracks}
+            track, error = track_panels(tracks, length)
+            shown |= {"track": track, "cross-track error": error}
+        return shown
+
 
 @dataclass(frozen=True, eq=False)
 class AutopilotResult:
@@ -106,6 +124,23 @@ class AutopilotResult:
     def stable(self) -> bool:
         """True if the model can be used."""
         return self.instability is None
+
+    def plot(self, name: str = "heading", ax: Any = None) -> Any:
+        """Draw a figure of the report on axes of matplotlib, and return these.
+
+        Raises InputError for an unknown one, or where no autopilot was verified.
+
+        Parameters
+        ----------
+        name : {"heading", "rudder", "criteria", "track", "cross-track error"}
+            Response to a change of course, IMO criteria, or track keeping.
+        ax : matplotlib.axes.Axes, optional
+            By default the current ones.
+        """
+        shown = {}
+        if self.verification is not None:
+            shown = self.verification.panels(self.model.particulars["length"])
+        return draw(shown[check_choice(name, shown, "plot")], ax)
 
     @property
     def metrics(self) -> dict[str, Any]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from identification.judging.fit import Fit
 from identification.pipeline.summary import result_card, summary_table
 from shipgym import InputError
+from shipgym.checks import check_choice
 from shipgym.drafts import draft_folder
 from shipgym.files import write_json
 
@@ -59,6 +60,30 @@ class IdentificationResult(Fit):
         for name, metrics in self.metrics["trials"].items():
             rows[name] = {"use": metrics["use"], **metrics["rmse"]}
         return DataFrame.from_dict(rows, orient="index")
+
+    def plot(self, channel: str = "psi", trial: str = "", ax: Any = None) -> Any:
+        """Draw a trial as measured and as predicted on axes of matplotlib.
+
+        Returns the axes. Raises InputError for an unknown trial or channel.
+
+        Parameters
+        ----------
+        channel : str
+            As in `Trial.plot`.
+        trial : str, optional
+            Its name; by default the first that was held out, else the first.
+        ax : matplotlib.axes.Axes, optional
+            By default the current ones.
+        """
+        known = {one.name: one for one in self.trials}
+        first, *_ = sorted(self.trials, key=lambda one: one.use == "fit")
+        shown = known[check_choice(trial or first.name, known, "trial")]
+        ax = shown.plot(channel, ax, label="measured", color="#1f2a37")
+        predicted = self.predictions.get(shown.name)
+        if predicted is not None:
+            predicted.plot(channel, ax, label="predicted", color="#1d70b8")
+        ax.legend(title=shown.name)
+        return ax
 
     def save(self, folder: str | Path) -> None:
         """Write model.json, metrics.json and settings.json, all or none.

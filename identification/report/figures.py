@@ -12,7 +12,7 @@ from identification.judging.warnings import EQUATIONS
 from shipgym import Trial
 from shipgym.manoeuvres.quantiles import NORMAL_95
 from shipgym.plots import Panel, axis, line, panels, points
-from shipgym.plots.style import LIMIT, MUTED, Figure
+from shipgym.plots.style import LIMIT, MODEL, MUTED, Figure
 from shipgym.plots.trials import history_panel, path_panel
 
 RUDDER = "#9aa5b1"
@@ -65,7 +65,8 @@ def residual_figure(fit: Fit) -> Figure:
     shown = []
     for q, error in residuals(fit.estimators, fit.samples).items():
         own = autocorrelation(error[rows], 24)
-        traces = [{"type": "bar", "x": np.arange(1, 25), "y": own, "name": q}]
+        bars = {"type": "bar", "x": np.arange(1, 25), "y": own, "name": q}
+        traces = [{**bars, "marker": {"color": MODEL}, "showlegend": False}]
         for level in (-bound, bound):
             ends = [level] * 2
             traces.append(line([0.5, 24.5], ends, "95 % of white noise", LIMIT, 1.2))

@@ -3,9 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from shipgym.pages.numbers import counted
 from shipgym.pages.templates import render
-from shipgym.plots.style import Figure
-from shipgym.plots.trials import history_figure, path_figure
+from shipgym.plots.style import Figure, panels
+from shipgym.plots.trials import history_panel, path_figure
 from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial
 
@@ -39,8 +40,31 @@ def look_page(
     records = []
     for trial, reading in zip(trials, readings, strict=True):
         records.append(_record(trial, reading))
+    headline, kind = verdict(trials, to_decide)
     return render(
-        "shipgym.pages/look.html", name=name, records=records, to_decide=to_decide
+        "shipgym.pages/look.html",
+        name=name,
+        headline=headline,
+        kind=kind,
+        records=records,
+        to_decide=to_decide,
+    )
+
+
+def verdict(trials: Sequence[Trial], to_decide: Sequence[str]) -> tuple[str, str]:
+    """A sentence on what the trials are good for; "good", "warn" or "bad"."""
+    if to_decide:
+        return f"{counted(len(to_decide), 'decision')} to take before use.", "bad"
+    channels = {channel for trial in trials for channel in trial.channels}
+    if not channels & {"delta", "delta_command"}:
+        return "Nothing can be identified from this: there is no rudder.", "bad"
+    if not channels & {"psi", "r"}:
+        return "Nothing can be identified from this: there is no heading.", "bad"
+    remarks = sum(len(trial.notes) for trial in trials)
+    found = counted(remarks, "remark") if remarks else "no remark"
+    return (
+        f"{counted(len(trials), 'trial')} to identify a model from, with {found}.",
+        "warn" if remarks else "good",
     )
 
 
@@ -60,6 +84,9 @@ def declared_reading(ship_file: ShipFile, trial: Trial) -> dict[str, str]:
 
 def _record(trial: Trial, reading: Mapping[str, str]) -> _Record:
     measured = {"measured": trial}
+    shown = [history_panel(measured, channel) for channel in _CHANNELS]
+    histories = [panel for panel in shown if panel.traces]
+    height = 150 * ((len(histories) + 1) // 2) + 70
     has_position = "x" in trial and "y" in trial
     return _Record(
         name=trial.name,
@@ -67,7 +94,7 @@ def _record(trial: Trial, reading: Mapping[str, str]) -> _Record:
         reading=reading,
         notes=trial.notes,
         track=path_figure(measured) if has_position else None,
-        history=history_figure(measured, _CHANNELS),
+        history=panels(histories, height, 2),
     )
 
 

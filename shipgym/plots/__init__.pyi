@@ -1,3 +1,4 @@
+from .axes import draw as draw
 from .manoeuvres import manoeuvre_figure as manoeuvre_figure
 from .manoeuvres import turning_figure as turning_figure
 from .manoeuvres import zigzag_figure as zigzag_figure

@@ -61,6 +61,8 @@ def panels(
     """
     columns = max(min(columns, len(shown)), 1)
     rows = max(math.ceil(len(shown) / columns), 1)
+    if columns > 1:
+        shown = [panel if panel.title else _titled(panel) for panel in shown]
     titles = [panel.title for panel in shown]
     is_titled = any(titles)
     settings = {"vertical_spacing": 0.36 / max(rows, 2)}
@@ -117,6 +119,13 @@ def _axis_number(k: int) -> str:
     return str(k + 1) if k else ""
 
 
+def _titled(panel: Panel) -> Panel:
+    """A panel whose vertical axis is told above it: a title beside it takes width."""
+    y = _axis(panel.y)
+    title = y["title"]["text"]
+    return panel._replace(y={**y, "title": {"text": ""}}, title=title)
+
+
 def _axis(given: Axis) -> dict[str, Any]:
     return axis(given) if isinstance(given, str) else dict(given)
 
@@ -152,7 +161,7 @@ def _layout(
         "font": {"family": _FONT, "size": 12, "color": INK},
         "paper_bgcolor": "white",
         "plot_bgcolor": "white",
-        "margin": {"l": left, "r": 18, "t": 64 if titled else 36, "b": 46},
+        "margin": {"l": left, "r": 18, "t": 76 if titled else 36, "b": 46},
         "legend": {
             "orientation": "h",
             "x": 0.0,
@@ -202,9 +211,8 @@ def line_styles(labels: Iterable[str]) -> dict[str, dict[str, Any]]:
 
 
 def translucent(colour: str, opacity: float) -> str:
-    """A colour "#rrggbb" with an opacity, as CSS knows it."""
-    red, green, blue = bytes.fromhex(colour.removeprefix("#"))
-    return f"rgba({red},{green},{blue},{opacity})"
+    """A colour "#rrggbb" with an opacity."""
+    return f"{colour}{round(255 * opacity):02x}"
 
 
 def line(

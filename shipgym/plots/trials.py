@@ -2,61 +2,12 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
-import numpy as np
-
-from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.plots.style import Figure, Panel, axis, line, line_styles, panels
+from shipgym.trials.axes import CHANNEL_AXES as CHANNEL_AXES
+from shipgym.trials.axes import quantity
 from shipgym.trials.trial import Trial
-
-
-class ChannelAxis(NamedTuple):
-    """The axis on which a channel is drawn."""
-
-    title: str
-    factor: float = 1.0  # from SI units
-
-
-_IN_DEGREES = 180.0 / math.pi
-
-#: Axis of each channel, and of what u and v give; m/s and degrees.
-CHANNEL_AXES = {
-    "x": ChannelAxis("north, m"),
-    "y": ChannelAxis("east, m"),
-    "psi": ChannelAxis("heading, deg", _IN_DEGREES),
-    "u": ChannelAxis("surge, m/s"),
-    "v": ChannelAxis("sway, m/s"),
-    "r": ChannelAxis("yaw rate, deg/s", _IN_DEGREES),
-    "p": ChannelAxis("roll rate, deg/s", _IN_DEGREES),
-    "phi": ChannelAxis("heel, deg", _IN_DEGREES),
-    "delta": ChannelAxis("rudder, deg", _IN_DEGREES),
-    "delta_command": ChannelAxis("rudder order, deg", _IN_DEGREES),
-    "n": ChannelAxis("shaft, rev/s"),
-    "n_command": ChannelAxis("shaft order, rev/s"),
-    "speed": ChannelAxis("speed, m/s"),
-    "drift": ChannelAxis("drift angle, deg", _IN_DEGREES),
-    "wind_speed": ChannelAxis("wind, m/s"),
-}
-
-
-def quantity(trial: Trial, name: str) -> Floats | None:
-    """Channel of a trial, or speed (m/s) or drift angle (rad); None without them.
-
-    The drift angle is positive where the ship moves to port of her heading.
-    """
-    if name in trial.channels:
-        return trial[name]
-    if "u" not in trial or "v" not in trial:
-        return None
-    u = trial["u"]
-    v = trial["v"]
-    if name == "speed":
-        return np.hypot(u, v)
-    if name == "drift":
-        return np.arctan2(-v, u)
-    return None
 
 
 def thinned(trial: Trial) -> slice:
@@ -95,7 +46,7 @@ def history_panel(trials: Mapping[str, Trial], channel: str) -> Panel:
     styles = line_styles(trials)
     lines = []
     for label, trial in trials.items():
-        values = quantity(trial, channel)
+        values = quantity(trial.channels, channel)
         if values is None:
             continue
         part = thinned(trial)
@@ -118,7 +69,7 @@ def path_figure(trials: Mapping[str, Trial]) -> Figure:
     panel = path_panel(trials)
     if not panel.traces:
         raise InputError("figure: expected a trial with the channels x and y, got none")
-    return panels([panel], height=460, hovermode="closest")
+    return panels([panel], height=420, hovermode="closest")
 
 
 def path_panel(trials: Mapping[str, Trial], axis_name: str = "x") -> Panel:

@@ -24,6 +24,7 @@ from shipgym.checks import (
 )
 from shipgym.errors import InputError
 from shipgym.files import write_text
+from shipgym.trials.axes import plot
 from shipgym.trials.columns import parse_columns
 from shipgym.trials.conventions import Conventions, Installation
 from shipgym.trials.cuts import cut_log
@@ -359,6 +360,22 @@ class Trial:
         keywords are those of :meth:`from_csv`. Raises InputError as that does.
         """
         return cls.from_csv(read_frame(frame), columns, **settings)
+
+    def plot(self, channel: str = "psi", ax: Any = None, **line: Any) -> Any:
+        """Draw a channel over time on axes of matplotlib, and return these.
+
+        Raises InputError if the trial has no such channel.
+
+        Parameters
+        ----------
+        channel : str
+            A channel, "speed" or "drift"; or "path": the track from above.
+        ax : matplotlib.axes.Axes, optional
+            By default the current ones.
+        line : dict
+            Settings of matplotlib's line, such as ``label`` or ``color``.
+        """
+        return plot(self.t, self.channels, channel, ax, **line)
 
     def to_csv(self, path: str | Path) -> None:
         """Write time and channels in SI units; :meth:`from_csv` reads the same numbers.

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from agents import benchmark
 from agents.benchmarking.page import write_page
@@ -64,3 +65,14 @@ def test_the_page_holds_its_numbers_and_where_they_are_from(result, page):
 def test_a_page_that_cannot_be_written_is_refused(result, tmp_path):
     with pytest.raises(InputError, match=r"ends in \.html"):
         write_page(result, tmp_path / "page.txt")
+
+
+def test_the_ranking_is_drawn_on_the_axes_of_a_user(result):
+    ax = Figure().subplots()
+    assert result.plot(ax) is ax
+    ranges, dots = ax.lines[::2], ax.lines[1::2]
+    ranked = result.summary["ranking"]["steering"]
+    scores = [one["scores"]["ship"] for one in ranked if one["scores"]]
+    assert [dot.get_xdata()[0] for dot in dots] == [one["value"] for one in scores]
+    lows = [one["low"] for one in scores]
+    assert [line.get_xdata()[0] for line in ranges] == lows

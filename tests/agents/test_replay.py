@@ -91,11 +91,12 @@ def shown(tmp_path):
 
 
 def histories(page):
-    """First and last value of each line of the histories, by the title of its axis."""
+    """First and last value of each line of the histories, by its panel."""
     found = {}
     data, layout = plots_of(page)["histories"]
+    titles = [annotation["text"] for annotation in layout["annotations"]]
     for trace in data:
-        title = layout["yaxis" + trace["yaxis"][1:]]["title"]["text"]
+        title = titles[int(trace["yaxis"][1:] or 1) - 1]
         y = values(trace["y"])
         found.setdefault(title, []).append((y[0], y[-1]))
     return found

@@ -6,10 +6,11 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
 from agents.cli.autopilot import print_autopilot
 from agents.verification.page import write_report
-from shipgym import Trial
+from shipgym import InputError, Trial
 from shipgym.pages import environment, percent
 from shipgym.plots import graph_objects
 from tests.agents.browser import COMMAND, Browser
@@ -147,7 +148,7 @@ def test_a_browser_without_network_draws_every_figure_also_for_paper(chain):
             " plot._fullLayout.width)"
         )
         browser.run("window.dispatchEvent(new Event('beforeprint'))")
-        assert browser.run(widths) == 6 * [690]  # as wide as the paper
+        assert browser.run(widths) == 6 * [920]  # at a zoom of 0.75 the paper's
         browser.run("window.dispatchEvent(new Event('afterprint'))")
         assert min(browser.run(widths)) > 690
         assert (browser.complaints, browser.requests) == ([], [address])
@@ -228,3 +229,16 @@ def test_a_figure_cannot_end_the_script_it_stands_in():
 )
 def test_a_probability_is_certain_only_if_it_is(share, shown):
     assert percent(share) == shown
+
+
+def test_figures_are_drawn_on_the_axes_of_a_user(chain):
+    result = chain[1]
+    for name in result.verification.panels(100.0):
+        ax = Figure().subplots()
+        assert result.plot(name, ax) is ax
+        assert ax.lines
+    labels = result.plot("heading", Figure().subplots()).get_legend_handles_labels()[1]
+    pilots = {pilot.name for pilot in result.verification.pilots}
+    assert {*labels} == {*pilots, "set course"}
+    with pytest.raises(InputError, match="plot: expected one of 'criteria', 'heading'"):
+        result.plot("step")

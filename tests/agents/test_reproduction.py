@@ -7,22 +7,14 @@ from papers.markdown import page
 from papers.page import missed
 from typer.testing import CliRunner
 
-from agents.cli import app, reproduction
+from agents.cli import app
 
 
 def test_a_paper_that_is_not_known_gets_one_message(capfd):
-    """Through the command `shipgym`, which runs the program of the checkout."""
+    """Through the command `shipgym`, which runs a program of its own."""
     answer = CliRunner().invoke(app, ["reproduce", "cao2051"])
     assert answer.exit_code == 2
     assert "Did you mean 'cao2015'" in capfd.readouterr().err
-
-
-def test_an_installed_package_says_where_the_tables_are_made(monkeypatch, tmp_path):
-    monkeypatch.setattr(reproduction, "SCRIPT", tmp_path / "reproduce.py")
-    answer = CliRunner().invoke(app, ["reproduce", "xu2020"])
-    assert answer.exit_code == 2
-    assert "checkout" in answer.stderr
-    assert "python scripts/reproduce.py xu2020" in answer.stderr
 
 
 def test_rows_for_programs_and_the_page_for_readers(tmp_path):

@@ -11,6 +11,7 @@ from html import escape
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
 from identification import (
     IdentificationResult,
@@ -21,7 +22,7 @@ from identification import (
 from identification.judging.warnings import held_out_error
 from identification.pipeline.result import FILES
 from identification.report.page import report_page
-from shipgym import ShipFile, ShipModel, Trial
+from shipgym import InputError, ShipFile, ShipModel, Trial
 from shipgym.pages import fixed
 
 ROOT = Path(__file__).parents[2]
@@ -141,3 +142,14 @@ def test_a_notebook_shows_a_card_and_frames(truncated: IdentificationResult) -> 
     assert "<td>" in truncated._repr_html_()
     uses = [trial.use for trial in truncated.trials]
     assert truncated.trials_frame()["use"].tolist() == uses
+
+
+def test_a_trial_and_its_prediction_are_drawn_on_the_axes_of_a_user(
+    truncated: IdentificationResult,
+) -> None:
+    ax = Figure().subplots()
+    assert truncated.plot("r", ax=ax) is ax
+    labels = [line.get_label() for line in ax.lines]
+    assert labels == ["measured", "predicted"]
+    with pytest.raises(InputError, match="trial: expected one of"):
+        truncated.plot(trial="none")

@@ -1,5 +1,8 @@
+import sys
+
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from shipgym import InputError, Trial, load_model
 from shipgym.manoeuvres import (
@@ -76,7 +79,7 @@ def test_a_zigzag_is_drawn_as_the_change_of_heading_with_its_rudder():
 
 
 def test_without_plotly_the_message_says_what_to_install(monkeypatch, circle):
-    monkeypatch.setitem(__import__("sys").modules, "plotly.subplots", None)
+    monkeypatch.setitem(sys.modules, "plotly.subplots", None)
     with pytest.raises(InputError, match=r"pip install 'shipgym\[report\]'"):
         path_figure({"turn": circle})
 
@@ -106,3 +109,18 @@ def test_every_manoeuvre_has_its_figure():
     for name, title in axes.items():
         figure = manoeuvre_figure(known[name].sail(ship))
         assert figure.layout.yaxis.title.text == title
+
+
+def test_a_trial_is_drawn_on_the_axes_of_a_user(circle, monkeypatch):
+    ax = Figure().subplots()
+    assert circle.plot("psi", ax, label="turn") is ax
+    (line,) = ax.lines
+    assert line.get_ydata() == pytest.approx(np.degrees(circle["psi"]))
+    assert (ax.get_ylabel(), line.get_label()) == ("heading, deg", "turn")
+    track = circle.plot("path", Figure().subplots()).lines[0]
+    assert track.get_xdata() == pytest.approx(circle["y"])
+    with pytest.raises(InputError, match=r"channel: .*got 'pssi'. Did you mean 'psi'"):
+        circle.plot("pssi", ax)
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
+    with pytest.raises(InputError, match=r"pip install 'shipgym\[report\]'"):
+        circle.plot("psi")
