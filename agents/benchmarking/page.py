@@ -24,6 +24,7 @@ METRICS = {
     "violated_clearance": "share of time too close to others",
     "success": "share of success",
 }
+STATISTICS = {"mean": "mean", "p95": "95th percentile"}
 #: Sets of episodes as the page calls them.
 TITLES = {
     "ship": "score on the ship",
@@ -57,7 +58,8 @@ def write_page(result: BenchmarkResult, path: str | Path) -> None:
     shown = {
         **summary,
         "lead": (
-            f"{controllers} in {len(result.tasks)} of {tasks}, {episodes} of each set."
+            f"First: {result.ranking[0]}. {controllers} in {len(result.tasks)} of"
+            f" {tasks}, {episodes} of each set."
         ),
         "failures": result.failures,
         "limits": limits,
@@ -73,6 +75,10 @@ def _limits_text(limits: Mapping[str, float]) -> str:
     """Sentence on the limits of a task; empty if it has none."""
     parts = []
     for name, limit in limits.items():
-        statistic = "mean" if LIMITED_FIGURES[name] == "mean" else "95th percentile"
-        parts.append(f"{METRICS[name]} {number(limit)} ({statistic})")
-    return f"Limits: {'; '.join(parts)}." if parts else ""
+        title = METRICS[name]
+        statistic = STATISTICS[LIMITED_FIGURES[name]]
+        parts.append(f"{title} {number(limit)} ({statistic})")
+    if not parts:
+        return ""
+    limited = "; ".join(parts)
+    return f"Limits: {limited}."

@@ -58,13 +58,8 @@ def metrics(run: Rollout) -> dict[str, Floats]:
     if _on_path(run.task):
         followed = path_following(run)
     success = succeeded(run)
-    lost = run.terminated & (success == 0.0)
-    violated = {}
-    for name in run.task.constraints:
-        broken = during(run, CONSTRAINT + name) > 0.0
-        intervals = total(broken)
-        share = ratio(intervals, run.steps)
-        violated[f"violated_{name}"] = share
+    failed = success == 0.0
+    lost = run.terminated & failed
     heel = nowhere  # of a ship without roll
     if "phi" in run.histories:
         angles = np.abs(during(run, "phi"))
@@ -73,7 +68,7 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         **costs(run),
         **steering(run),
         **followed,
-        **violated,
+        **violations(run),
         "success": success,
         "heel_deg": heel,
         "speed_lost_percent": speed_lost(run),
@@ -81,6 +76,18 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         "terminated": lost.astype(np.float64),
         "failed": run.failed.astype(np.float64),
     }
+
+
+def violations(run: Rollout) -> dict[str, Floats]:
+    """Share of the time in which each constraint of the task is broken."""
+    shares = {}
+    for name in run.task.constraints:
+        amount = during(run, CONSTRAINT + name)
+        broken = amount > 0.0
+        intervals = total(broken)
+        share = ratio(intervals, run.steps)
+        shares[f"violated_{name}"] = share
+    return shares
 
 
 def succeeded(run: Rollout) -> Floats:

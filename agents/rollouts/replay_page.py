@@ -17,6 +17,10 @@ from shipgym.plots.trials import history_panel, path_panel
 from shipgym.tasks.guidance import wrapped
 
 FRAMES = 200  # places of the slider
+#: Hull from the bow to starboard and round, in parts of length and beam.
+OUTLINE = np.array(
+    [(0.5, 0.0), (0.2, 0.5), (-0.5, 0.4), (-0.5, -0.4), (0.2, -0.5), (0.5, 0.0)]
+)
 #: Channels in the order of the page; what no episode has is left out.
 CHANNELS = ("psi", "delta", "delta_command", "u", "r", "phi", "n", "wind_speed")
 
@@ -105,16 +109,22 @@ def _with_slider(figure: Figure, times: Sequence[str]) -> Figure:
 
 def _hull(episode: Episode, time: float) -> dict[str, list[float]]:
     """Outline of a ship at a time, x east and y north; at its end it stays."""
+    t = episode.t
     states = episode.states
-    heading = np.interp(time, episode.t, np.unwrap(states["psi"]))
-    shape = [(0.5, 0.0), (0.2, 0.5), (-0.5, 0.4), (-0.5, -0.4), (0.2, -0.5), (0.5, 0.0)]
+    turned = np.unwrap(states["psi"])
+    heading = np.interp(time, t, turned)
+    north = np.interp(time, t, states["x"])
+    east = np.interp(time, t, states["y"])
     slender = episode.length / 6.5  # a beam that is not known
-    outline = np.array(shape) * [episode.length, episode.beam or slender]
-    ahead, aside = outline.T
-    sine, cosine = np.sin(heading), np.cos(heading)
-    north = np.interp(time, episode.t, states["x"]) + ahead * cosine - aside * sine
-    east = np.interp(time, episode.t, states["y"]) + ahead * sine + aside * cosine
-    return {"x": np.round(east, 2).tolist(), "y": np.round(north, 2).tolist()}
+    size = np.array([episode.length, episode.beam or slender])
+    outline = size * OUTLINE
+    sine = np.sin(heading)
+    cosine = np.cos(heading)
+    to_north = outline @ [cosine, -sine]
+    to_east = outline @ [sine, cosine]
+    x = np.round(east + to_east, 2)
+    y = np.round(north + to_north, 2)
+    return {"x": x.tolist(), "y": y.tolist()}
 
 
 def _histories(runs: Mapping[str, Episode], trials: Mapping[str, Trial]) -> Figure:

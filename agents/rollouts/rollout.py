@@ -186,7 +186,12 @@ class _Helmsman:
             given, fault = _numbers(actions, values.shape)
             missing = sailing & ~np.isfinite(given).all(axis=1)
             values = np.where((sailing & ~missing)[:, None], given, values)
-            fault = fault or _no_number(given, missing, sailing)
+            if missing.any() and not fault:
+                ship = int(np.argmax(missing))
+                fault = (
+                    f"expected numbers in [-1, 1], got {given[ship]} for ship {ship};"
+                    " look for a division by zero in the controller"
+                )
             beyond = self.tolerant and np.abs(values).max(initial=0.0) > 1.0 + 1e-6
             if beyond and not fault:
                 fault = "expected numbers in [-1, 1], got others, which are limited"
@@ -209,15 +214,3 @@ def _numbers(actions: Any, shape: tuple[int, int]) -> tuple[NDArray[np.float32],
     if values.shape != shape:
         return nothing, f"expected actions of shape {shape}, got {values.shape}"
     return values, ""
-
-
-def _no_number(values: NDArray[np.float32], missing: Flags, sailing: Flags) -> str:
-    """What is wrong with commands that are not finite; empty if all are."""
-    if not missing.any():
-        return ""
-    first = int(np.argmax(missing))
-    return (
-        f"expected numbers in [-1, 1], got {values[first]} for ship {first}: no finite"
-        f" number for {missing.sum()} of {sailing.sum()} ships; look for a division by"
-        " zero in the controller"
-    )

@@ -68,12 +68,12 @@ def criteria_panel(criteria: Mapping[str, Criterion]) -> Panel:
         marks = _marks_of(criterion, row)
         traces += [dots, *marks]
         names.append(criterion_name(name, criterion))
-    ends = [-0.5, len(criteria) - 0.5]
+    rows = list(range(len(names)))
+    end = len(names) - 0.5
+    ends = [-0.5, end]
     traces.append(_limit_line(ends))
-
-    rows = range(len(names))
     names_axis = axis(
-        tickvals=list(rows),
+        tickvals=rows,
         ticktext=names,
         range=ends[::-1],
         showgrid=False,

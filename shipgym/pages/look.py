@@ -7,7 +7,6 @@ from shipgym.pages.numbers import counted
 from shipgym.pages.templates import render
 from shipgym.plots.style import Figure, panels
 from shipgym.plots.trials import history_panel, path_figure
-from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial
 
 _CHANNELS = ("psi", "r", "delta", "u", "v", "n", "phi", "wind_speed")
@@ -27,7 +26,7 @@ class _Record(NamedTuple):
 def look_page(
     name: str,
     trials: Sequence[Trial],
-    readings: Sequence[Mapping[str, str]] = (),
+    readings: Sequence[Mapping[str, str]],
     to_decide: Sequence[str] = (),
 ) -> str:
     """The page, as text, of the trials in a file of that name.
@@ -35,11 +34,8 @@ def look_page(
     `readings` say of each trial what its channels were read as, and why; `to_decide`
     are the decisions that the log leaves to its reader.
     """
-    nothing_said: list[Mapping[str, str]] = [{}] * len(trials)
-    readings = readings or nothing_said
-    records = []
-    for trial, reading in zip(trials, readings, strict=True):
-        records.append(_record(trial, reading))
+    pairs = zip(trials, readings, strict=True)
+    records = [_record(trial, reading) for trial, reading in pairs]
     headline, kind = verdict(trials, to_decide)
     return render(
         "shipgym.pages/look.html",
@@ -66,20 +62,6 @@ def verdict(trials: Sequence[Trial], to_decide: Sequence[str]) -> tuple[str, str
         f"{counted(len(trials), 'trial')} to identify a model from, with {found}.",
         "warn" if remarks else "good",
     )
-
-
-def declared_reading(ship_file: ShipFile, trial: Trial) -> dict[str, str]:
-    """What the channels of a trial are in its log, as its ship file declares."""
-    reading = {}
-    for entry in ship_file.entries:
-        if trial.name != entry.file and not trial.name.startswith(f"{entry.file} "):
-            continue
-        for channel, column in (entry.columns or {}).items():
-            unit = column.unit or "the SI unit"
-            reading[channel] = f"column '{column.name}' in {unit}, as declared"
-        side = entry.conventions.rudder_positive
-        reading["rudder positive to"] = f"{side}, as declared"
-    return reading
 
 
 def _record(trial: Trial, reading: Mapping[str, str]) -> _Record:

@@ -281,14 +281,8 @@ def test_controllers_are_given_the_model_only_and_designs_on_the_ship_are_refuse
     assert (given[0].name, given[0].true_ship, given[0].far) == ("turns", "", {})
     assert given[0].scenario("ship").ship.name == "mariner-tls-svm"
 
-    def hidden(design_task):
-        policy = LQ.from_model(design_task.ship)
-        inner = LQ.from_model(load_model("mariner"))
-        object.__setattr__(policy, "fallback", inner)  # its class is frozen
-        return policy
-
     with pytest.raises(InputError, match="got one on the ship 'mariner'"):
-        Entry("cheat", hidden).made(task)
+        Entry("cheat", lambda _: LQ.from_model(MARINER)).made(task)
 
 
 def test_a_run_that_sails_more_than_the_budget_is_refused():
