@@ -259,7 +259,7 @@ def errors(
     Of advance and tactical diameter in per cent; then, for each set of angles, of the
     first two overshoots in degrees.
     """
-    ship = shipgym.truth_of(model)
+    ship = shipgym.load_model(model.provenance["truth"])
     turns = [
         100.0
         * np.abs(_turn(model, side * rudder) / _turn(ship, side * rudder) - 1.0).max()

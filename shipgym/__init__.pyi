@@ -14,10 +14,8 @@ from .models import ShipModel as ShipModel
 from .models import list_models as list_models
 from .models import load_model as load_model
 from .models import register_ship_equations as register_ship_equations
-from .models import truth_of as truth_of
 from .models.checker import ModelCheck as ModelCheck
 from .models.checker import check_ship_model as check_ship_model
-from .models.scaling import scale_model as scale_model
 from .sea.conditions import Current as Current
 from .sea.conditions import Waves as Waves
 from .sea.conditions import Weather as Weather

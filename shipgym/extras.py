@@ -1,46 +1,9 @@
 """Libraries of the package's extras, imported on first use."""
 
-from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
-from lazy_loader import attach_stub
-
 from shipgym.errors import InputError
-
-#: Classes by the names that papers have for them.
-IN_PAPERS = {
-    "TLSSVM": "TruncatedLSSVM",
-    "ABCLSSVR": "ArtificialBeeColony",
-    "PSOLSSVR": "ParticleSwarm",
-    "LSSVR": "LSSVM",
-}
-
-
-def public_names(
-    package: str, file: str
-) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """What a package's `__getattr__`, `__dir__` and `__all__` are, by its `.pyi` file.
-
-    Each name is imported when it is first used; an unknown one is refused with the
-    nearest.
-    """
-    get, names, listed = attach_stub(package, file)
-
-    def named(name: str) -> Any:
-        try:
-            return get(name)
-        except AttributeError:
-            if name.startswith("_"):
-                raise
-            from shipgym.checks import did_you_mean
-
-            plain = name.upper().replace("_", "")
-            near = did_you_mean(IN_PAPERS.get(plain, name), names())
-            message = f"module {package!r} has no attribute {name!r}.{near}"
-            raise AttributeError(message) from None
-
-    return named, names, listed
 
 
 def library(name: str, extra: str, use: str = "") -> Any:

@@ -9,6 +9,7 @@ broken where the rudder has corners.
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -28,9 +29,10 @@ from identification.samples.preprocess import (
     smoothed_channels,
 )
 from identification.samples.rudder import rebuild, straight
-from shipgym import InputError, Particulars, SteeringGear, Trial
+from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.arrays import Floats, Integers, integral
 from shipgym.checks import check_choice, check_whole
+from shipgym.models import converted_model
 from shipgym.ships import GreyBox, Structure
 from shipgym.trials.resampling import usual_step
 
@@ -255,13 +257,19 @@ class _Regression:
             terms["r"] = np.hstack([terms["r"], memory])
         return terms
 
+    @cached_property
+    def _bare_reference(self) -> ShipModel:
+        """Reference ship of a grey box, converted to the target."""
+        gear = self.gear or SteeringGear()
+        return converted_model(self.structure, self.particulars, gear, self.shaft_speed)
+
     def _terms(self, channels: Channels) -> dict[str, Floats]:
         """The terms by equation; last, of a grey box, the reference's acceleration."""
         structure = self.structure
         motion = (channels, self.particulars, self.shaft_speed)
         terms = {q: structure.features(q, *motion) for q in structure.equations}
         if isinstance(structure, GreyBox):
-            known = structure.converted_accelerations(*motion)
+            known = self._bare_reference.rates(channels)
             terms = {q: np.column_stack([own, known[q]]) for q, own in terms.items()}
         return terms
 

@@ -11,8 +11,7 @@ import numpy as np
 from identification.samples.prediction import predict
 from real_ships.data import MeasuredShip
 from real_ships.section import headings, number
-from shipgym.models import ShipModel
-from shipgym.models.scaling import scale_model
+from shipgym.models import ShipModel, converted_model
 from shipgym.trials.trial import Trial
 
 SHIP = "kvlcc2_marin"
@@ -34,11 +33,15 @@ def full_scale(model: ShipModel, marin: MeasuredShip) -> ShipModel:
     The tanks ran different propellers: shaft speeds are told by each one's at service
     speed.
     """
-    scaled = scale_model(model, marin.particulars.length, marin.particulars["speed"])
-    shaft = float(np.mean([trial["n"][0] for trial in marin.runs.values()]))
-    return replace(
-        scaled, service_shaft_speed=shaft, steering=marin.steering or scaled.steering
+    ship = marin.particulars
+    travel = ship["length"] / ship["speed"]
+    gear = marin.steering or replace(
+        model.steering,
+        rudder_rate_deg_s=model.steering.rudder_rate_deg_s * model.travel_time / travel,
+        time_constant=model.steering.time_constant * travel / model.travel_time,
     )
+    shaft = float(np.mean([trial["n"][0] for trial in marin.runs.values()]))
+    return converted_model(model, ship, gear, shaft)
 
 
 def painter(

@@ -79,8 +79,8 @@ class CompiledSea:
     state, parameters : Record, or pair of a Record and the paths that have a row
         For a `Layout`.
     functions : mapping
-        Hooks by name: `push`, `evolve`, `begin_sea`, `encounter_frequency`,
-        `add_current`, and the constant `HAS_SEA`.
+        Hooks by name: `push`, `evolve`, `begin_sea`, `encounter_frequency`, and the
+        constant `HAS_SEA`.
     """
 
     state: Any

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
 
-from shipgym.engine import episodes, hooks, sailing, stages, tiles
+from shipgym.engine import episodes, sailing, stages, tiles
 from shipgym.engine.annotations import ObservationSpec
 from shipgym.engine.compiled_ship import CompiledSea, CompiledShip
 from shipgym.engine.compiling import compiled, plain_python
@@ -148,8 +148,6 @@ class EpisodeProgram:
             **self.ship.hooks(shared=self.shared),
             **self.ship.staged,
             **self.sea.functions,
-            "CURRENT_BY_PLACE": self.task.current is not None,
-            "current_at": self.task.current or hooks.current_at,
         }
 
     @cached_property

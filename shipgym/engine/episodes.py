@@ -11,9 +11,7 @@ from typing import Any
 import numpy as np
 
 from shipgym.engine.hooks import (
-    add_current,
     begin_sea,
-    current_at,
     load_arguments,
     load_counters,
     load_outcome,
@@ -21,7 +19,6 @@ from shipgym.engine.hooks import (
     load_rules,
     load_sea_parameters,
     load_ship,
-    load_task_settings,
     sail_lanes,
     store_commands,
     store_memory,
@@ -43,7 +40,7 @@ from shipgym.engine.judging import (
 from shipgym.engine.lane_records import Commands, Random, SeaRandom
 from shipgym.engine.mathematics import pick
 from shipgym.engine.memory import bool_in, float32_in, int64_row_in
-from shipgym.engine.motion import CURRENT_BY_PLACE, HAS_SEA, Motion
+from shipgym.engine.motion import HAS_SEA, Motion
 from shipgym.engine.random import BEGIN_WORDS, rng_state, uniform
 from shipgym.engine.records import LANES
 from shipgym.engine.sailing import are_finite, take_commands
@@ -191,10 +188,6 @@ def begin_sea_of(tile: Tile, lane: int, motion: Motion, random: Random) -> None:
     word = rng_state(random.key, random.episode)
     parameters = load_sea_parameters(tile.ships, lane)
     sea = begin_sea(motion, word, parameters)
-    if CURRENT_BY_PLACE:
-        settings = load_task_settings(tile.task_settings, 0)
-        here = current_at(motion.x, motion.y, settings)
-        sea = add_current(sea, here[0], here[1])
     store_sea(tile.state, lane, sea)
     store_sea_random(tile.random, lane, SeaRandom(word + BEGIN_WORDS))
 

@@ -76,9 +76,6 @@ push = given  # (motion, sea, parameters) -> `Push` of now
 evolve = given  # (motion, h, sea, word, parameters) -> sea h seconds later
 begin_sea = given_and_called  # (motion, word, parameters) -> sea of an episode's begin
 encounter_frequency = given  # (motion, sea, parameters) -> rad/s; 0 in calm water
-add_current = given  # (sea, north, east) -> sea with a current added, m/s
-# (x, y, settings) -> north and east, m/s, of a current that differs from place to place
-current_at = given
 
 # The sensor set (interface: `shipgym.instruments.perfect`)
 measure = given

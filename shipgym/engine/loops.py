@@ -7,7 +7,7 @@ from typing import Any
 
 from shipgym.engine import batches, steered, trajectories
 from shipgym.engine.compiled_ship import STILL_WATER, CompiledSea, CompiledShip
-from shipgym.engine.compiling import compiled
+from shipgym.engine.compiling import compiled, plain
 from shipgym.engine.lane_records import Inputs, SeaChannels, WindAccelerations
 from shipgym.engine.record_code import loader, storer
 from shipgym.engine.records import LANES, Layout, Rows
@@ -64,8 +64,22 @@ LOOPS = {
 def ship_loop(ship: CompiledShip, name: str, sea: CompiledSea = STILL_WATER) -> Any:
     """Compile a loop of `LOOPS` for a ship, by default in still water."""
     loop = LOOPS[name]
+    where = "in the open sea" if sea.windy else "in calm water"
+    what = f"{ship.name} {where}: {name}"
+    return compiled(loop.function, loop.signature, _hooks(ship, loop, sea), what)
+
+
+@cache
+def plain_loop(ship: CompiledShip, name: str) -> Any:
+    """Return a loop of `LOOPS` for a ship in still water, in plain Python."""
+    loop = LOOPS[name]
+    return plain(loop.function, _hooks(ship, loop, STILL_WATER))
+
+
+def _hooks(ship: CompiledShip, loop: Loop, sea: CompiledSea) -> dict[str, Any]:
+    """Functions and values for the hooks of a loop, by name."""
     channels = Rows(SeaChannels, len(ship.state_names), SEA_CHANNELS)
-    hooks = {
+    return {
         **ship.hooks(loop.lanes, loop.shared),
         **sea.hooks(loop.lanes),
         "store_sea_channels": storer(channels, 1),
@@ -73,6 +87,3 @@ def ship_loop(ship: CompiledShip, name: str, sea: CompiledSea = STILL_WATER) -> 
         "load_wind": loader(Layout(wind=WindAccelerations)["wind"], 1),
         **loop.hooks,
     }
-    where = "in the open sea" if sea.windy else "in calm water"
-    what = f"{ship.name} {where}: {name}"
-    return compiled(loop.function, loop.signature, hooks, what)

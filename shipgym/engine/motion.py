@@ -17,7 +17,6 @@ HAS_SHAFT = True  # a shaft speed among the states
 HAS_MEMORY = True  # of yaw
 HAS_LAG = True  # a steering gear with a time constant
 HAS_SEA = True
-CURRENT_BY_PLACE = False  # the hook `current_at` of `shipgym.engine.hooks`
 
 
 class Motion(NamedTuple):
@@ -37,7 +36,6 @@ class Motion(NamedTuple):
 
 
 at = changer(Motion, "x", "y", "psi", "n")
-moving = changer(Motion, "u", "v")
 
 
 class Ship(NamedTuple):
@@ -298,14 +296,6 @@ def sail(
 
     slopes = add_rates(add_rates(add_rates(k1, 2.0, k2), 2.0, k3), 1.0, k4)
     return end_of_step(motion, start, slopes, held, h, ship)
-
-
-def in_other_water(motion: Motion, north: float, east: float) -> Motion:
-    """Motion through water whose current is more by so much, the same over ground."""
-    sine, cosine = sin_cos(motion.psi)
-    ahead = north * cosine + east * sine
-    aside = east * cosine - north * sine
-    return moving(motion, motion.u - ahead, motion.v - aside / upright(motion))
 
 
 def lost(motion: Motion, ship: Ship) -> bool:

@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 
 from shipgym.engine.hooks import (
-    add_current,
-    current_at,
     evolve,
     load_coefficients,
     load_commands,
@@ -22,7 +20,6 @@ from shipgym.engine.hooks import (
     load_sea_parameters,
     load_sea_random,
     load_ship,
-    load_task_settings,
     push,
     store_commands,
     store_counters,
@@ -33,12 +30,10 @@ from shipgym.engine.hooks import (
 from shipgym.engine.lane_records import Commands, EpisodeCounters, SeaRandom
 from shipgym.engine.mathematics import clip, pick
 from shipgym.engine.motion import (
-    CURRENT_BY_PLACE,
     HAS_SEA,
     Motion,
     Push,
     Ship,
-    in_other_water,
     lost,
     sail,
 )
@@ -129,9 +124,6 @@ def end_substep(tile: Tile, lane: int, after: Motion, h: float, ship: Ship) -> N
     counters = load_counters(state, lane)
     over = counters.ended != 0.0
     away = lost(after, ship)
-    if CURRENT_BY_PLACE:
-        after = in_local_water(tile, lane, before, after, h)
-
     motion = pick(away | over, before, after)
     ran_away = pick(away, 1.0, counters.ran_away)
     counters = counted(counters, counters.steps, ran_away)
@@ -141,55 +133,11 @@ def end_substep(tile: Tile, lane: int, after: Motion, h: float, ship: Ship) -> N
     store_counters(state, lane, counters)
 
 
-def in_local_water(
-    tile: Tile,
-    lane: int,
-    before: Motion,
-    after: Motion,
-    h: float,
-) -> Motion:
-    """Motion through the water that a ship has come to, of which she had come from.
-
-    She is carried along like the water she displaces; where she moves through it into
-    water of another speed, hers over ground stays.
-    """
-    settings = load_task_settings(tile.task_settings, 0)
-    sea = load_sea(tile.state, lane)
-    drifted_x = before.x + h * sea.current_north
-    drifted_y = before.y + h * sea.current_east
-    left = current_at(drifted_x, drifted_y, settings)
-    met = current_at(after.x, after.y, settings)
-    north = met[0] - left[0]
-    east = met[1] - left[1]
-    return in_other_water(after, north, east)
-
-
-def evolved_sea(
-    tile: Tile,
-    lane: int,
-    motion: Motion,
-    h: float,
-    word: Any,
-    parameters: Any,
-) -> Any:
-    """Return the sea h seconds later, with the current where the ship is then."""
-    sea = load_sea(tile.state, lane)
-    if not CURRENT_BY_PLACE:
-        return evolve(motion, h, sea, word, parameters)
-    settings = load_task_settings(tile.task_settings, 0)
-    before = load_motion(tile.state, lane)
-    left = current_at(before.x, before.y, settings)
-    met = current_at(motion.x, motion.y, settings)
-    everywhere = add_current(sea, -left[0], -left[1])
-    evolved = evolve(motion, h, everywhere, word, parameters)
-    return add_current(evolved, met[0], met[1])
-
-
 def evolve_sea(tile: Tile, lane: int, motion: Motion, h: float, over: bool) -> None:
     """Advance the sea around a ship by h seconds, unless her episode is over."""
     sea = load_sea(tile.state, lane)
     parameters = load_sea_parameters(tile.ships, lane)
     word = load_sea_random(tile.random, lane).rng_state
-    evolved = evolved_sea(tile, lane, motion, h, word, parameters)
+    evolved = evolve(motion, h, sea, word, parameters)
     store_sea(tile.state, lane, pick(over, sea, evolved))
     store_sea_random(tile.random, lane, SeaRandom(word + EVOLVE_WORDS))

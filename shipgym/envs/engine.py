@@ -19,7 +19,7 @@ from shipgym.engine.records import LANES
 from shipgym.envs.lanes import Contents, Lanes
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES
 from shipgym.envs.plain_python import fault_of_interval, plain_loop
-from shipgym.envs.randomisation import Pool, Randomisation
+from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.python_files import asked, place_of
@@ -104,7 +104,7 @@ class Engine(Lanes):
         randomisation = randomisation or Randomisation()
         self.pool = randomisation.ships(model, task.seas)
         drawn = len(self.pool) > 1
-        windy = _any_weather(self.pool, task)
+        windy = any(not sea.calm for _, sea in self.pool)
         own = [(ship, task.seas[0]) for ship in ships]
         if drawn:
             if len(ships) > 1:
@@ -359,13 +359,6 @@ class Engine(Lanes):
     def reward_parts(self) -> Floats:
         """Parts of the last rewards, shape (num_envs, n_parts)."""
         return np.stack([self.info(name) for name in self.task.reward_parts], axis=-1)
-
-
-def _any_weather(pool: Pool, task: Task) -> bool:
-    """Return whether there is current, wind or waves in any episode."""
-    if task.definition.current is not None:
-        return True
-    return any(not sea.calm for _, sea in pool)
 
 
 def _check_ships(

@@ -43,8 +43,6 @@ def plain_loop(
         "measure": program.sensors.Memory,
         "readings": Readings,
     }
-    if task.current is not None:
-        forms["current_at"] = (float, float)
     checked = {name: _checked(program, name, form) for name, form in forms.items()}
     run = plain(function, {**program.hooks, **checked, **(hooks or {})})
     # words of random numbers overflow, as they do when compiled

@@ -158,9 +158,6 @@ def _numbers(
     numbers: dict[str, NDArray[Any]] = {}
     for path in engine.program.state_rows["task_state"].present:
         numbers[f"State.{path}"] = engine.read(path)
-    if engine.task.definition.current is not None:
-        numbers["current: north"] = engine.read("current_north")
-        numbers["current: east"] = engine.read("current_east")
     for name in engine.task.reward_parts:
         numbers[name] = engine.info(name)
     return numbers | dict(zip(_seen_names(engine), observations.T, strict=True))
@@ -175,8 +172,6 @@ def _seen_names(engine: Engine) -> list[str]:
 def _source_of(name: str, task: Task) -> str:
     """File that a number comes from, for messages."""
     definition = task.definition
-    if name.startswith("current"):
-        return place_of(definition.current)
     if name.startswith("reward_"):
         return definition.reward_source
     if task.sensors is None or not name.startswith("Observation."):

@@ -189,35 +189,6 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-def truth_of(model: str | Path | ShipModel) -> ShipModel:
-    """The reference ship whose simulated trials an identified model comes from.
-
-    What was designed, tuned or trained on the model can be evaluated on her: the
-    shipped identified models name her in their provenance, as `truth`. A model is given
-    as itself, or as `load_model` takes it.
-
-    Raises InputError for a model that names no reference ship of its size: a reference
-    ship herself, one identified from recorded trials, one that was scaled.
-
-    >>> truth_of("mariner-tls-svm").name
-    'mariner'
-    """
-    if not isinstance(model, ShipModel):
-        model = load_model(model)
-    provenance = model.provenance or {}
-    name = str(provenance.get("truth"))
-    if name in REFERENCE_SHIPS:
-        ship = REFERENCE_SHIPS[name]()
-        length = model.particulars.length
-        if ship.particulars.length == length:
-            return ship
-    raise InputError(
-        f"model {model.name!r}: provenance.truth: expected the reference ship of her"
-        f" size behind the trials, as 'mariner-tls-svm' names it, got {name!r};"
-        " evaluate on a ship that you name yourself"
-    )
-
-
 # ---- grey boxes ----------------------------------------------------------------------
 
 

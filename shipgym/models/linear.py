@@ -153,17 +153,10 @@ def _units(model: ShipModel) -> dict[str, float]:
 
 
 def _prime_rates(model: ShipModel, state: dict[str, float]) -> dict[str, float]:
-    """Accelerations by name at a state, prime system, shaft as in service."""
-    at = {"n": model.service_shaft_speed} | state
-    channels = {name: np.array([value]) for name, value in at.items()}
-    accelerations = model.accelerations(channels)
+    """Rates by name at a state, prime system, shaft as in service."""
+    rates = model.plain_rates(state)
     units = _units(model)
-    travel_time = model.travel_time
-    rates = {}
-    for name, values in accelerations.items():
-        unit = units[name] / travel_time
-        rates[name] = float(values[0]) / unit
-    return rates
+    return {name: rates[name] * model.travel_time / units[name] for name in rates}
 
 
 def linearise(model: ShipModel, at: StraightRunning) -> tuple[Floats, Floats]:

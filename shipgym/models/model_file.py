@@ -21,13 +21,10 @@ Format 1 has these fields:
 * `provenance`: null or an object.
 * `draws`: rows of coefficients drawn from a posterior, in their order; absent where
   there are none.
-* `sha256`: of coefficients, covariance and draws (`numbers_hash`); may be absent.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -65,7 +62,6 @@ OPTIONAL = (
     "envelope",
     "provenance",
     "draws",
-    "sha256",
 )
 
 
@@ -124,35 +120,8 @@ def read_model(
         service_shaft_speed=shaft_speed,
         draws=draws,
     )
-    if "sha256" in fields:
-        _check_hash(model, fields["sha256"], f"{where}: sha256")
     model.ship_numbers()  # refuses particulars that the structure cannot do with
     return model
-
-
-def _check_hash(model: ManoeuvringModel, given: Any, where: str) -> None:
-    """Refuse a file whose numbers do not match its hash."""
-    expected = numbers_hash(model)
-    if given != expected:
-        raise unexpected(
-            where,
-            f"{expected!r}, that of the file's coefficients, covariance and draws",
-            given,
-            "they were changed after the file was written; take another copy, or, if"
-            " the change is yours, leave out the field sha256",
-        )
-
-
-def numbers_hash(model: ManoeuvringModel) -> str:
-    """SHA-256 of coefficients, covariance and draws, in the order of the structure."""
-    covariance = None
-    if model.covariance is not None:
-        covariance = model.covariance.tolist()
-    numbers = [model.coefficients, covariance]
-    if model.draws is not None:
-        numbers.append(model.draws.tolist())
-    text = json.dumps(numbers)
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _read_dynamics(

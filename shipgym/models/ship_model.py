@@ -14,7 +14,7 @@ from shipgym.arrays import Floats
 from shipgym.checks import placed
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
-from shipgym.models.model_file import numbers_hash, read_model
+from shipgym.models.model_file import read_model
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 
 if TYPE_CHECKING:  # for annotations, and where a ship is simulated
@@ -158,7 +158,7 @@ class ShipModel(ManoeuvringModel):
 
     def save(self, path: str | Path) -> None:
         """Write the model as a JSON file (format in `shipgym.models.model_file`)."""
-        write_json({**self.to_dict(), "sha256": numbers_hash(self)}, Path(path))
+        write_json(self.to_dict(), Path(path))
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

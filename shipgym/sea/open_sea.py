@@ -81,9 +81,8 @@ class Sea(NamedTuple):
     r_wave: float
 
 
-with_current = changer(Sea, "current_north", "current_east")
-#: (sea, gust, drift, the oscillators and the first-order motion)
-moved = changer(Sea, *Sea._fields[Sea._fields.index("gust") :])
+#: (sea, current, gust, drift, the oscillators and the first-order motion)
+moved = changer(Sea, *Sea._fields[Sea._fields.index("current_north") :])
 
 
 class FromBow(NamedTuple):
@@ -271,7 +270,9 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
         sea.current_east, sea.mean_east, p.current, normal(word, DRAW[1])
     )
     return moved(
-        with_current(sea, north, east),
+        sea,
+        north,
+        east,
         first_order_step(sea.gust, 0.0, p.gust, normal(word, DRAW[2])),
         first_order_step(sea.drift, 0.0, p.drift, normal(word, DRAW[3])),
         heading.displacement,
@@ -340,17 +341,11 @@ def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
     )
 
 
-def add_current(sea: Sea, north: float, east: float) -> Sea:
-    """Sea with a current added, m/s."""
-    return with_current(sea, sea.current_north + north, sea.current_east + east)
-
-
 _FUNCTIONS = {
     "push": push,
     "evolve": evolve,
     "begin_sea": begin_sea,
     "encounter_frequency": encounter_frequency,
-    "add_current": add_current,
 }
 OPEN_SEA = CompiledSea(Sea, SeaParameters, {"HAS_SEA": True, **_FUNCTIONS})
 #: Its records take no rows and are read as zeros.

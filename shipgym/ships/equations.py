@@ -12,7 +12,6 @@ import importlib
 import math
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -217,35 +216,6 @@ class ShipEquations:
             lag=lag,
         )
 
-    def accelerations_at(
-        self,
-        channels: Mapping[str, Floats],
-        coefficients: Mapping[str, float],
-        particulars: Particulars,
-        ship: Ship,
-    ) -> dict[str, Floats]:
-        """Accelerations at samples of shape (n_samples,), in plain Python, by state.
-
-        They are nan where Python has no number; a shaft is ordered to turn as in
-        service.
-        """
-        numbers = self.numbers(coefficients, particulars, ship.shaft)
-        c = self.coefficients_record(*numbers.tolist())
-        accelerations = self.accelerations
-        motions = _motions(channels)
-        found = np.full((len(motions), len(ACCELERATIONS)), math.nan)
-        for row, motion in zip(found, motions, strict=True):
-            with suppress(ArithmeticError, ValueError):
-                row[:] = accelerations(motion, c, ship)
-
-        equations = ("u", "v", "r", "p", "q")
-        rates = dict(zip(equations, found.T, strict=True))
-        shaft = self.shaft_acceleration
-        if shaft is not None:
-            lag = [shaft(motion.n, ship.shaft, c, ship) for motion in motions]
-            rates["n"] = np.array(lag)
-        return rates
-
     def numbers(
         self,
         coefficients: Mapping[str, float],
@@ -258,14 +228,6 @@ class ShipEquations:
     def to_dict(self) -> dict[str, Any]:
         """Equations as written in a model file."""
         return {"name": self.name, "source": self.source}
-
-
-def _motions(channels: Mapping[str, Floats]) -> list[Motion]:
-    """Motion at each sample of some channels; absent ones are 0."""
-    none = np.zeros(len(channels["u"]))
-    columns = [channels.get(name, none) for name in Motion._fields]
-    rows = np.stack(columns, axis=-1).tolist()
-    return [Motion(*row) for row in rows]
 
 
 def read_ship_equations(path: str | Path) -> ShipEquations:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
@@ -250,31 +251,21 @@ class ManoeuvringModel:
         columns = rates.T
         return dict(zip(self.state_names, columns, strict=True))
 
-    def accelerations(
-        self, channels: Mapping[str, Floats], water_depth: float = np.inf
-    ) -> dict[str, Floats]:
-        """Accelerations at a few samples, as `derivatives` has them, without compiling.
+    def plain_rates(self, state: Mapping[str, float]) -> dict[str, float]:
+        """`derivatives` by name at one state, in plain Python: nothing is compiled.
 
-        The channels are the states by name, each of shape (n_samples,), in SI units; a
-        state that is absent is 0. Returns the accelerations of `u`, `v`, `r`, and of
-        `p`, of the memory `q` and of a shaft `n` with dynamics (ordered to turn as in
-        service) where the model has them, each of shape (n_samples,).
+        States that are absent are 0; a shaft is ordered to turn as in service. A rate
+        is nan where Python has no number.
         """
-        none = np.zeros(len(channels["u"]))
-        names = (*self.state_names, *self.command_names)
-        complete = dict.fromkeys(names, none)
-        complete |= channels
-        known = self.dynamics.accelerations_at(
-            complete,
-            self.coefficients,
-            self.particulars,
-            ship_of(self, water_depth),
-        )
-        accelerations = {}
-        for name in self.state_names:
-            if name in ("u", "v", "r", "p", "q", "n"):
-                accelerations[name] = known.get(name, none)
-        return accelerations
+        from shipgym.engine.loops import plain_loop
+
+        row = np.array([[state.get(name, 0.0) for name in self.state_names]])
+        orders = np.array([[state.get("delta", 0.0), self.service_shaft_speed]])
+        rates = np.full_like(row, np.nan)
+        loop = plain_loop(self.compiled, "derivatives")
+        with np.errstate(all="ignore"), suppress(ArithmeticError, ValueError):
+            loop(row, orders, np.array([np.inf]), self.ship_numbers(), rates)
+        return dict(zip(self.state_names, rates[0].tolist(), strict=True))
 
     # ---- model file ------------------------------------------------------------------
 

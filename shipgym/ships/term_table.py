@@ -16,7 +16,6 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_table, check_text, quoted
 from shipgym.engine.compiled_ship import CompiledShip, compiled_ship
-from shipgym.engine.motion import Ship
 from shipgym.errors import InputError
 from shipgym.ships import term_functions
 from shipgym.ships.particulars import Particulars, prime_inertia
@@ -336,45 +335,6 @@ class Structure:
         """Coefficients of the SI features of the accelerations; shape (n_terms,)."""
         matrix = self.acceleration_matrix(particulars, shaft_speed)
         return np.asarray(matrix @ np.array(list(coefficients.values())))
-
-    def accelerations_at(
-        self,
-        channels: Mapping[str, Floats],
-        coefficients: Mapping[str, float],
-        particulars: Particulars,
-        ship: Ship,
-    ) -> dict[str, Floats]:
-        """Accelerations by equation at samples (n_samples,), without compiling."""
-        found = self._sums_at(
-            channels,
-            coefficients,
-            particulars,
-            shaft_speed=ship.shaft,
-        )
-        for name in ("v", "r"):
-            if name not in found:
-                found[name] = -channels[name] * (ship.speed / ship.length)
-        if "q" in found:
-            found["r"] = found["r"] + channels["q"]
-        return found
-
-    def _sums_at(
-        self,
-        channels: Mapping[str, Floats],
-        coefficients: Mapping[str, float],
-        particulars: Particulars,
-        shaft_speed: float,
-    ) -> dict[str, Floats]:
-        """Sums of the terms at samples, by equation."""
-        weights = self.term_numbers(coefficients, particulars, shaft_speed)
-        sums = {}
-        first = 0
-        for equation, terms in self.equations.items():
-            last = first + len(terms)
-            features = self.features(equation, channels, particulars, shaft_speed)
-            sums[equation] = features @ weights[first:last]
-            first = last
-        return sums
 
     # ---- simulation: the function that is compiled -----------------------------------
 

@@ -37,7 +37,6 @@ and may define
 * `check(settings, model)`: raises `InputError` for settings that do not fit, first
   without a ship, `model` None, then with one; `listed(value)`: what a keyword of
   another kind, such as a list of waypoints, means as numbers.
-* `current(x, y, settings) -> (north, east)`: a current by place, m/s.
 * `draw(motion, state, ship, settings)`: shapes for pictures (`shipgym.tasks.shapes`).
 * `rule(seen, ship, settings)`: the command that the best rule you know gives for an
   `Observation` in SI units: the rudder, or (rudder, shaft), as parts of the largest.

@@ -55,7 +55,6 @@ FUNCTIONS = {
     "on_event": (*MOMENT, "random", "plan"),
     "worst_cost": ("settings",),
     "plan_length": ("settings",),
-    "current": ("x", "y", "settings"),
     "draw": ("motion", "state", "ship", "settings"),
     "rule": ("seen", "ship", "settings"),
     "check": ("settings", "model"),
@@ -132,8 +131,6 @@ class TaskDefinition(Configurable):
     Settings, State, Reward, Observation : type
     begin, step, observe : callable
     due, on_event, worst_cost, plan_length, check, listed : callable
-    current : callable or None
-        Current by place, `current(x, y, settings) -> (north, east)`, m/s.
     draw : callable or None
         Shapes for pictures (`shipgym.tasks.shapes`).
     rule : callable or None
@@ -170,7 +167,6 @@ class TaskDefinition(Configurable):
     half_reward_cost: float = 0.1
     perfect_step: float = 1.0
     loss_horizon: float = 100.0
-    current: Callable[..., Any] | None = None
     draw: Callable[..., Any] | None = None
     rule: Callable[..., Any] | None = None
 

@@ -1,6 +1,5 @@
 """The ships of equations that no structure has, on which coverage is counted."""
 
-import numpy as np
 import pytest
 
 from shipgym import check_ship_model
@@ -12,13 +11,12 @@ from tests.ships.foreign import FOREIGN
 @pytest.mark.parametrize("name", FOREIGN)
 def test_she_is_sound_keeps_her_speed_and_turns_to_her_rudder(name: str) -> None:
     ship = FOREIGN[name]()
-    channels = {"u": np.array([ship.particulars["speed"]])}
-    channels["n"] = np.array([ship.service_shaft_speed])
-    ahead = ship.accelerations(channels | {"delta": np.zeros(1)})
-    steered = ship.accelerations(channels | {"delta": np.array([0.2])})
-    assert abs(ahead["u"][0]) * ship.travel_time < 0.05 * ship.particulars["speed"]
-    assert steered["r"][0] > ahead["r"][0]
-    assert steered["v"][0] < ahead["v"][0]
+    state = {"u": ship.particulars["speed"], "n": ship.service_shaft_speed}
+    ahead = ship.plain_rates(state)
+    steered = ship.plain_rates(state | {"delta": 0.2})
+    assert abs(ahead["u"]) * ship.travel_time < 0.05 * ship.particulars["speed"]
+    assert steered["r"] > ahead["r"]
+    assert steered["v"] < ahead["v"]
 
 
 @pytest.mark.parametrize("name", ["naval-vessel", "inland-ship"])

@@ -57,7 +57,7 @@ def test_every_environment_has_an_identified_model_by_default():
         if name != "shipgym/RudderRoll-v0"
     ]
     found = [
-        (model.provenance["method"], shipgym.truth_of(model).name) for model in models
+        (model.provenance["method"], model.provenance["truth"]) for model in models
     ]
     assert all(
         model.provenance["stable"] and model.covariance is not None for model in models
@@ -86,28 +86,10 @@ def test_models_sail_like_the_ships_behind_their_trials_where_these_did_not_reac
     assert held_out < overshoot
 
 
-def test_the_ship_behind_a_model_is_known_or_the_error_says_what_to_do():
-    assert {
-        name: shipgym.truth_of(name).name
-        for name in ("mariner-nomoto", "tanker-tls-svm")
-    } == {"mariner-nomoto": "mariner", "tanker-tls-svm": "tanker"}
-    drawn = shipgym.load_model("tanker-tls-svm").sample(1, 0)[0]
-    assert shipgym.truth_of(drawn).name == "tanker"
-    for other in (
-        "kvlcc2",
-        shipgym.scale_model(shipgym.load_model("mariner-tls-svm"), 100.0),
-    ):
-        with pytest.raises(
-            shipgym.InputError,
-            match=r"provenance.truth: expected the reference",
-        ):
-            shipgym.truth_of(other)
-
-
 def test_the_tanker_is_unstable_on_her_course_and_her_model_knows_it():
     for model in (
         shipgym.load_model("tanker-tls-svm"),
-        shipgym.truth_of("tanker-tls-svm"),
+        shipgym.load_model("tanker"),
     ):
         assert not is_course_stable(model)
 

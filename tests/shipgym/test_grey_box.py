@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import shipgym
-from shipgym import ShipModel, register_structure, scale_model
+from shipgym import ShipModel, register_structure
 from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag
 from shipgym.models import converted_model, grey_box
@@ -49,16 +49,6 @@ def test_a_reference_ship_converted_to_itself_is_itself(name: str) -> None:
     )
     for channel in ("u", "v", "r", "psi"):
         np.testing.assert_allclose(ours[channel], theirs[channel], rtol=0.0, atol=1e-12)
-
-
-def test_a_bare_table_of_terms_at_another_scale_is_the_scaled_model() -> None:
-    ship = shipgym.load_model("mariner")
-    small = scale_model(ship, 7.0)
-    ours, theirs = (
-        zigzag(model, 20, 20, duration=120, dt=0.1)
-        for model in (converted_model(ship, small.particulars, small.steering), small)
-    )
-    np.testing.assert_allclose(ours["psi"], theirs["psi"], rtol=0.0, atol=1e-11)
 
 
 def test_accelerations_are_the_converted_ones_and_the_terms(

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import shipgym
-from shipgym import manoeuvres, scale_model
+from shipgym import Particulars, manoeuvres
+from shipgym.models import converted_model
 from shipgym.ships import Structure
 from shipgym.ships.inertia import inertia, rigid_inertia
 
@@ -134,10 +135,16 @@ def test_a_ship_without_thrust_loses_energy(name, drift_deg, turn):
 def test_a_ship_scaled_by_froude_sails_the_same_track_in_ship_lengths(name, size):
     """Speeds and times go with the root of the length."""
     ship = shipgym.load_model(name)
-    other = scale_model(ship, ship.particulars["length"] * size)
-    assert other.particulars["speed"] == pytest.approx(
-        ship.particulars["speed"] * np.sqrt(size)
+    particulars = Particulars(
+        length=ship.particulars["length"] * size,
+        speed=ship.particulars["speed"] * np.sqrt(size),
     )
+    gear = replace(
+        ship.steering,
+        rudder_rate_deg_s=ship.steering.rudder_rate_deg_s / np.sqrt(size),
+        time_constant=ship.steering.time_constant * np.sqrt(size),
+    )
+    other = converted_model(ship, particulars, gear, ship.service_shaft_speed)
     one = manoeuvres.turning_circle(ship, 35, 400.0, 0.5)
     two = manoeuvres.turning_circle(
         other, 35, 400.0 * np.sqrt(size), 0.5 * np.sqrt(size)
