@@ -84,19 +84,6 @@ def check_keys(
             )
 
 
-def check_fields(
-    content: Mapping[str, Any],
-    names: Collection[str],
-    where: str,
-    remedy: str,
-) -> None:
-    """Refuse an unknown field of a file, and a missing one, with its `remedy`."""
-    check_keys(content, names, where)
-    for name in names:
-        if name not in content:
-            raise InputError(f"{where}: field '{name}' is missing; {remedy}")
-
-
 def check_format(content: Mapping[str, Any], known: int, where: str) -> None:
     """Refuse a file whose number `format` is another than the known one."""
     found = content.get("format", known)

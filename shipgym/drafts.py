@@ -8,7 +8,7 @@ import re
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from errno import EBUSY, ENOENT, EXDEV
+from errno import ENOENT
 from pathlib import Path
 from secrets import token_hex
 
@@ -31,12 +31,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
             raise InputError(f"{path}: is not a file; choose another name")
         draft.open("x").close()
         yield draft
-        try:
-            draft.replace(path)
-        except OSError as error:
-            if error.errno not in (EXDEV, EBUSY):  # those of a mount point
-                raise
-            shutil.copyfile(draft, path)
+        draft.replace(path)
     except OSError as error:
         remedy = "; choose a folder that exists" if error.errno == ENOENT else ""
         raise InputError(

@@ -34,17 +34,7 @@ DEEPEST = 20  # levels of lists and tables within each other
 LONGEST_KEY = 4096  # characters
 LARGEST_NUMBER = 1e100  # magnitude: products of three such numbers are still finite
 
-#: Kinds of files that users mistake for one another, and the commands that take them.
-TAKEN_BY = {
-    "log": "shipgym new-ship",
-    "ship file": "shipgym look, identify or autopilot",
-    "model file": "shipgym trials, export or train --model",
-    "controller file": "shipgym export or benchmark --controllers",
-    "recorded episode": "shipgym replay",
-    "Python file": "shipgym benchmark --controllers as MODULE:FUNCTION",
-}
 RESULTS = ("model.json", "agent.json", "ship.toml")
-KIND_OF_SUFFIX = {"": "", ".toml": "ship file", ".py": "Python file", ".json": ""}
 
 #: Characters that UTF-8 cannot encode, or that end a text for the operating system.
 _UNWRITABLE = re.compile("[\0\ud800-\udfff]")
@@ -165,46 +155,8 @@ def read_json(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
     Raises InputError as `read_text` does, and if the file is cut short, holds no
     object, or something that `check_content` refuses.
     """
-    with _refusing_others(path, what):
-        text = read_text(path, f"{what} (JSON)", LARGEST_JSON)
-        content = check_table(parse_json(text, f"{path}:", remedy), str(path))
-    _refuse_other(path, what, _kind_of_json(content))
-    return content
-
-
-@contextmanager
-def _refusing_others(path: Path, what: str) -> Iterator[None]:
-    """Where a file cannot be read, say what it seems to be instead, if it is known."""
-    try:
-        yield
-    except InputError:
-        kind = ""
-        with suppress(OSError, ValueError, RecursionError):
-            if path.is_file():
-                kind = KIND_OF_SUFFIX.get(path.suffix.lower(), "log")
-            if path.suffix == ".json":
-                kind = _kind_of_json(json.loads(path.read_text("utf-8")))
-        _refuse_other(path, what, kind)
-        raise
-
-
-def _kind_of_json(content: Any) -> str:
-    """What a JSON file seems to be; empty if that is not known."""
-    if not isinstance(content, Mapping):
-        return ""
-    if "coefficients" in content:
-        return "model file"
-    if content.get("kind") == "episode":
-        return "recorded episode"
-    return "controller file" if "kind" in content else ""
-
-
-def _refuse_other(path: Path, what: str, kind: str) -> None:
-    """Refuse a file of another kind, with the commands that take it."""
-    if what in TAKEN_BY and kind not in ("", what):
-        raise InputError(
-            f"{path}: expected a {what}, got a {kind}; give it to {TAKEN_BY[kind]}"
-        )
+    text = read_text(path, f"{what} (JSON)", LARGEST_JSON)
+    return check_table(parse_json(text, f"{path}:", remedy), str(path))
 
 
 def parse_json(text: str, where: str, remedy: str) -> Any:
@@ -219,8 +171,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     Raises InputError as `read_text` does, and if the file is not TOML or holds
     something that `check_content` refuses.
     """
-    with _refusing_others(path, what):
-        return parse_toml(read_text(path, f"{what} (TOML)", LARGEST_TOML), f"{path}:")
+    return parse_toml(read_text(path, f"{what} (TOML)", LARGEST_TOML), f"{path}:")
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from agents.controllers.interface import model_hash
 from agents.output import check_writable, present
 from agents.suites.suite import BenchmarkTask, Suite
 from shipgym.arrays import Floats
-from shipgym.checks import check_fields, check_format
+from shipgym.checks import check_format, check_keys
 from shipgym.drafts import atomic_path
 from shipgym.errors import InputError
 from shipgym.extras import axes_of, library
@@ -301,7 +301,7 @@ def load_results(path: str | Path) -> BenchmarkResult:
             f"{where}: kind: expected '{KIND}', got {summary.get('kind')!r}"
         )
     check_format(summary, FORMAT, str(where))
-    check_fields(summary, FIELDS, str(where), REMEDY)
+    check_keys(summary, FIELDS, str(where), FIELDS)
     table = where.with_name(EPISODES)
     content = {name: summary[name] for name in FIELDS if name != "sha256"}
     if summary["sha256"] != _hash(content, table):

@@ -9,16 +9,13 @@ it is.
 
 import os
 import sys
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from shipgym.engine.cache import cached_path, load, locked, save
 from shipgym.engine.fingerprint import fingerprint, process_name, traced
-from shipgym.engine.numba_errors import explanation, refuse_unset
+from shipgym.engine.numba_errors import explanation
 from shipgym.engine.numba_import import load_numba
 from shipgym.engine.specialise import ALL, BOUNDS, Hooks, Specialisation
 from shipgym.errors import InputError
@@ -128,8 +125,7 @@ def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
     tell_who_waits(f"shipgym: compiling {what}, once, about 7 s")
     specialised = _named(Compilation(hooks).copy(loop))
     try:
-        with _unset_refused(hooks.get("CHECKED", True)):
-            return numba.njit(signature, nogil=True, **SEMANTICS)(specialised)
+        return numba.njit(signature, nogil=True, **SEMANTICS)(specialised)
     # the latter three: another record than is due, none at all, one whose field is set
     except (
         NumbaError,
@@ -139,24 +135,6 @@ def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
         NotImplementedError,
     ) as error:
         raise InputError(explanation(error, what)) from None
-
-
-@contextmanager
-def _unset_refused(checked: bool) -> Iterator[None]:
-    """Refuse, of what is compiled within, variables of users that may be unset."""
-    numba = load_numba()
-    from numba.core.errors import NumbaWarning
-
-    before = numba.config.ALWAYS_WARN_UNINIT_VAR
-    numba.config.ALWAYS_WARN_UNINIT_VAR = int(checked)
-    try:
-        with warnings.catch_warnings(record=True) as found:
-            warnings.simplefilter("always", NumbaWarning)
-            yield
-    finally:
-        numba.config.ALWAYS_WARN_UNINIT_VAR = before
-    for one in found:
-        refuse_unset(one.message)
 
 
 def _named(copy: Any) -> Any:

@@ -2,9 +2,7 @@
 
 import re
 from pathlib import Path
-from typing import Any
 
-from shipgym.errors import InputError
 from shipgym.python_files import LIBRARIES
 
 COLOUR = r"\x1b\[[\d;]*m"
@@ -36,25 +34,6 @@ def explanation(error: Exception, what: str) -> str:
     written = re.search(r"^def (\w+)\(", text, re.MULTILINE)
     where = f" in {written[1]}" if written else ""
     return f"{what}: cannot be compiled{where}{_place(text)}: {reason}"
-
-
-def refuse_unset(warning: Any) -> None:
-    """Raise an InputError if Numba warns of a user's variable that may be unset.
-
-    Python fails where such a variable is used; compiled code takes a 0 for it.
-    """
-    text = re.sub(COLOUR, "", str(warning))
-    name = re.search(r"uninitialized variable (\w+)", text)
-    place = re.search(r'File "([^"]+)", line (\d+)', text)
-    if not (name and place) or place[1].startswith("<"):
-        return
-    file = str(Path(place[1]).resolve())
-    if not file.startswith(LIBRARIES):
-        raise InputError(
-            f"{file}, line {place[2]}: expected variables that are set in every case,"
-            f" got {name[1]!r}, which is not; give it a value before the if or the loop"
-            " that sets it"
-        )
 
 
 def _reason(text: str) -> str:

@@ -23,7 +23,7 @@ Tracebacks, debuggers and `inspect.getsource` show the source.
 import hashlib
 import linecache
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -182,7 +182,7 @@ def _class_name(record: Record, names: dict[str, Any]) -> str:
 def written(
     name: str,
     arguments: str,
-    body: list[str],
+    body: Sequence[str],
     names: Mapping[str, Any],
 ) -> Function:
     """Make a function from its source, which is stored for tracebacks."""

@@ -2,11 +2,9 @@
 
 The function is written from the powers of the terms alone: each symbol is looked up
 among those below, coefficients are numbered, powers are repeated factors. So no name or
-text of a model file becomes part of a program. A grammar checks that before it is one.
+text of a model file becomes part of a program.
 """
 
-import hashlib
-import linecache
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -15,6 +13,7 @@ from math import fabs, sqrt
 from operator import itemgetter
 from typing import Any, NamedTuple
 
+from shipgym.engine.record_code import written
 from shipgym.engine.records import Record
 from shipgym.ships.terms import CHANNEL, SYMBOLS, VELOCITIES, Term
 
@@ -64,20 +63,6 @@ DAMPED = {
     "r": "-motion.r * (ship.speed / ship.length)",
 }
 
-_MADE = " ".join([*MADE_OF, *MADE_OF.values(), *DAMPED.values(), "motion.q"])
-_ACCELERATIONS = [f"{rate}dot" for rate in MOTION_RATES]
-_WORD = "|".join(
-    map(re.escape, [*re.findall(r"[A-Za-z_]+(?:\.\w+)?", _MADE), *_ACCELERATIONS])
-)
-#: All that a source may be: these words, numbered coefficients and numbers, joined by
-#: arithmetic.
-GRAMMAR = re.compile(
-    r"def accelerations\(motion, c, ship\):\n"
-    rf"(?:    (?:{_WORD}) = (?:\b(?:{_WORD}|c\.c\d+|\d\.\d)\b| [-+*/] |-|\(|\))+\n)+"
-    r"    return udot, vdot, rdot(?: \+ motion\.q)?, pdot, qdot\n",
-    re.ASCII,
-)
-
 
 def unit_speeds(equation: str) -> int:
     """Power of the speed in the unit of what an equation makes up."""
@@ -89,8 +74,10 @@ def speed_power(equation: str, term: Term) -> int:
     return unit_speeds(equation) - term.power(*VELOCITIES)
 
 
-def accelerations_source(equations: Equations, prime: bool, damped: bool = True) -> str:
-    """Write the source of `accelerations(motion, c, ship)`: factored sums of terms.
+def accelerations_source(
+    equations: Equations, prime: bool, damped: bool = True
+) -> tuple[str, ...]:
+    """Write the lines of `accelerations(motion, c, ship)`: factored sums of terms.
 
     Coefficients are numbered in the equations' order. `prime`: whether terms are in the
     prime system. Where one of those has more velocities than the sum, all velocities
@@ -117,21 +104,17 @@ def accelerations_source(equations: Equations, prime: bool, damped: bool = True)
         rates[equation] = rate
         needed |= _variables_in(rate)
 
-    return _written(rates, _with_their_makings(needed), memory="q" in equations)
+    return _lines(rates, _with_their_makings(needed), memory="q" in equations)
 
 
-def _written(rates: Mapping[str, str], variables: set[str], memory: bool) -> str:
-    """Source of the function, by the expressions of the rates."""
-    lines = ["def accelerations(motion, c, ship):"]
-    for name, made in MADE_OF.items():
-        if name in variables:
-            lines.append(f"    {name} = {made}")
-    for name in MOTION_RATES:
-        rate = rates.get(name, "0.0")
-        lines.append(f"    {name}dot = {rate}")
+def _lines(
+    rates: Mapping[str, str], variables: set[str], memory: bool
+) -> tuple[str, ...]:
+    """Lines of the function, by the expressions of the rates."""
+    makings = [f"{name} = {MADE_OF[name]}" for name in MADE_OF if name in variables]
+    sums = [f"{name}dot = {rates.get(name, '0.0')}" for name in MOTION_RATES]
     yaw = "rdot + motion.q" if memory else "rdot"
-    lines.append(f"    return udot, vdot, {yaw}, pdot, qdot\n")
-    return "\n".join(lines)
+    return (*makings, *sums, f"return udot, vdot, {yaw}, pdot, qdot")
 
 
 def _has_negative_power(equations: Equations) -> bool:
@@ -143,26 +126,10 @@ def _has_negative_power(equations: Equations) -> bool:
 
 
 @cache
-def accelerations_function(source: str) -> Any:
-    """Function of a source by `accelerations_source`; ValueError for any other text."""
-    if not GRAMMAR.fullmatch(source):
-        raise ValueError(
-            "accelerations: expected sums of products of known symbols, got"
-            f" {source[:200]!r}"
-        )
-    digest = hashlib.sha256(source.encode()).hexdigest()
-    name = f"<accelerations {digest[:12]}>"
-    namespace: dict[str, Any] = {
-        "sqrt": sqrt,
-        "fabs": fabs,
-        "__name__": __name__,
-    }
-    code = compile(source, name, "exec")
-    exec(code, namespace)
-    # for tracebacks
-    lines = source.splitlines(keepends=True)
-    linecache.cache[name] = (len(source), None, lines, name)
-    return namespace["accelerations"]
+def accelerations_function(lines: tuple[str, ...]) -> Any:
+    """Function of the lines by `accelerations_source`."""
+    names = {"sqrt": sqrt, "fabs": fabs}
+    return written("accelerations", "motion, c, ship", lines, names)
 
 
 @cache

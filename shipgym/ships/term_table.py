@@ -350,7 +350,7 @@ class Structure:
         )
 
     @cached_property
-    def _source(self) -> str:
+    def _source(self) -> tuple[str, ...]:
         """Written once, however many models share the table."""
         prime = self.normalisation == "prime"
         return term_functions.accelerations_source(self.equations, prime)

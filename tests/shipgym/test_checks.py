@@ -11,7 +11,6 @@ from shipgym import InputError
 from shipgym.checks import (
     check_array,
     check_choice,
-    check_fields,
     check_finite,
     check_flag,
     check_format,
@@ -109,8 +108,6 @@ def test_keys_that_are_unknown_or_missing_are_named():
     )
     with pytest.raises(InputError, match=r"^x: field 'a' is missing; give 'a', 'b'"):
         check_table({"b": 1}, "x", ("a", "b"), ("a", "b"))
-    with pytest.raises(InputError, match=r"^a: field 'b' is missing; train again$"):
-        check_fields({"a": 1}, ("a", "b"), "a", "train again")
 
 
 def test_a_place_is_named_once():

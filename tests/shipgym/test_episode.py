@@ -90,11 +90,7 @@ def test_an_episode_cannot_be_changed():
     ("name", "value", "said"),
     [
         ("format", 1, "expected format 2, which this version of shipgym reads, got 1"),
-        (
-            "kind",
-            "model",
-            "expected a recorded episode, got a controller file; give it",
-        ),
+        ("kind", "model", "kind: expected 'episode', got 'model'"),
         ("dt", 0, "dt: expected a number > 0"),
         ("seed", -1, "seed: expected an integer of at least 0"),
         ("beam", 500.0, "beam: expected a number > 0 and <= 160.93"),

@@ -1,7 +1,6 @@
 """Files appear whole or not at all, wherever they are, and nothing is left of those
 that did not."""
 
-import errno
 from pathlib import Path
 
 import pytest
@@ -31,16 +30,6 @@ def test_a_draft_has_a_random_name_and_never_follows_what_lies_there(
     assert victim.read_text() == "precious"
     assert not (tmp_path / "a").exists()
     assert not (tmp_path / "nowhere").exists()
-
-
-@pytest.mark.parametrize("error", [errno.EXDEV, errno.EBUSY])
-def test_a_file_that_is_a_mount_point_is_written(tmp_path, monkeypatch, error):
-    def replace(*_):
-        raise OSError(error, "mounted")
-
-    monkeypatch.setattr(Path, "replace", replace)
-    write_text("new", tmp_path / "model.json")
-    assert [path.read_text() for path in tmp_path.iterdir()] == ["new"]
 
 
 @pytest.mark.parametrize(
