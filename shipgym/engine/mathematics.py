@@ -13,6 +13,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from shipgym.engine.record_code import polynomial
+
 Choice = TypeVar("Choice")
 
 TWO_OVER_PI = 2.0 / pi
@@ -38,24 +40,72 @@ def nearest(x: float) -> float:
     return (x + SHIFT) - SHIFT
 
 
+sine_series = polynomial(
+    "sine_series",
+    -1.66666666666666324348e-01,
+    8.33333333332248946124e-03,
+    -1.98412698298579493134e-04,
+    2.75573137070700676789e-06,
+    -2.50507602534068634195e-08,
+    1.58969099521155010221e-10,
+)
+cosine_series = polynomial(
+    "cosine_series",
+    4.16666666666666019037e-02,
+    -1.38888888888741095749e-03,
+    2.48015872894767294178e-05,
+    -2.75573143513906633035e-07,
+    2.08757232129817482790e-09,
+    -1.13596475577881948265e-11,
+)
+exponential_series = polynomial(
+    "exponential_series",
+    1.66666666666666019037e-01,
+    -2.77777777770155933842e-03,
+    6.61375632143793436117e-05,
+    -1.65339022054652515390e-06,
+    4.13813679705723846039e-08,
+)
+power_series = polynomial(
+    "power_series",
+    1.0000000000000144,
+    0.6931471805599516,
+    0.24022650695639336,
+    0.05550410866438316,
+    0.009618129194101738,
+    0.001333355823666942,
+    0.00015403433646322688,
+    1.5252654813770773e-05,
+    1.3259667128066899e-06,
+    1.0209003757888788e-07,
+)
+arc_above = polynomial(
+    "arc_above",
+    -6.485021904942025371773e01,
+    -1.228866684490136173410e02,
+    -7.500855792314704667340e01,
+    -1.615753718733365076637e01,
+    -8.750608600031904122785e-01,
+)
+arc_below = polynomial(
+    "arc_below",
+    1.945506571482613964425e02,
+    4.853903996359136964868e02,
+    4.328810604912902668951e02,
+    1.650270098316988542046e02,
+    2.485846490142306297962e01,
+    1.0,
+)
+
+
 def sine_polynomial(y: float, z: float) -> float:
     """Sine of y within [-pi/4, pi/4]; z is its square."""
-    series = -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10
-    series = 2.75573137070700676789e-06 + z * series
-    series = -1.98412698298579493134e-04 + z * series
-    series = 8.33333333332248946124e-03 + z * series
-    series = -1.66666666666666324348e-01 + z * series
-    return y + y * z * series
+    return y + y * z * sine_series(z)
 
 
 def cosine_polynomial(z: float) -> float:
     """Cosine of an angle within [-pi/4, pi/4]; z is its square."""
-    series = 2.08757232129817482790e-09 - z * 1.13596475577881948265e-11
-    series = -2.75573143513906633035e-07 + z * series
-    series = 2.48015872894767294178e-05 + z * series
-    series = -1.38888888888741095749e-03 + z * series
-    series = 4.16666666666666019037e-02 + z * series
-    return 1.0 - 0.5 * z + z * z * series
+    return 1.0 - 0.5 * z + z * z * cosine_series(z)
 
 
 def sin_cos(x: float) -> tuple[float, float]:
@@ -137,11 +187,7 @@ def exponential(x: float) -> float:
     low = k * ln_2_low
     y = high - low
     z = y * y
-    series = -1.65339022054652515390e-06 + z * 4.13813679705723846039e-08
-    series = 6.61375632143793436117e-05 + z * series
-    series = -2.77777777770155933842e-03 + z * series
-    series = 1.66666666666666019037e-01 + z * series
-    c = y - z * series
+    c = y - z * exponential_series(z)
     mantissa = 1.0 - ((low - y * c / (2.0 - c)) - high)
     half = nearest(0.5 * k - 0.25)  # in two steps, for the subnormal numbers
     value = mantissa * power_of_two(half) * power_of_two(k - half)
@@ -156,16 +202,7 @@ def two_to(x: float) -> float:
     within = max(x, -1000.0)
     shifted = within + (SHIFT + 1023.0)  # in its lowest bits the biased exponent
     f = within - (shifted - (SHIFT + 1023.0))
-    mantissa = 1.3259667128066899e-06 + f * 1.0209003757888788e-07
-    mantissa = 1.5252654813770773e-05 + f * mantissa
-    mantissa = 0.00015403433646322688 + f * mantissa
-    mantissa = 0.001333355823666942 + f * mantissa
-    mantissa = 0.009618129194101738 + f * mantissa
-    mantissa = 0.05550410866438316 + f * mantissa
-    mantissa = 0.24022650695639336 + f * mantissa
-    mantissa = 0.6931471805599516 + f * mantissa
-    mantissa = 1.0000000000000144 + f * mantissa
-    return mantissa * power_of_bits(shifted)
+    return power_series(f) * power_of_bits(shifted)
 
 
 def arctan2(y: float, x: float) -> float:
@@ -181,16 +218,7 @@ def arctan2(y: float, x: float) -> float:
     q = above / pick(below > 0.0, below, 1.0)
 
     z = q * q
-    p = -1.615753718733365076637e01 + z * -8.750608600031904122785e-01
-    p = -7.500855792314704667340e01 + z * p
-    p = -1.228866684490136173410e02 + z * p
-    p = -6.485021904942025371773e01 + z * p
-    d = 2.485846490142306297962e01 + z
-    d = 1.650270098316988542046e02 + z * d
-    d = 4.328810604912902668951e02 + z * d
-    d = 4.853903996359136964868e02 + z * d
-    d = 1.945506571482613964425e02 + z * d
-    arc = q + q * (z * p / d)
+    arc = q + q * (z * arc_above(z) / arc_below(z))
 
     quarters = pick(steep, 0.5, pick(middling, 0.25, 0.0))
     half_pi_rest = 6.12323399573676588613e-17  # pi / 2 less its double

@@ -8,7 +8,7 @@ from math import fabs
 from typing import Any, NamedTuple
 
 from shipgym.engine.mathematics import clip, sin_cos, small_cosine, turn_sin_cos
-from shipgym.engine.record_code import changer
+from shipgym.engine.record_code import changer, fieldwise, zeros
 
 # Features of ship, gear and sea. Set when a loop is compiled, like hooks, so that
 # absent ones cost nothing.
@@ -64,7 +64,7 @@ class Push(NamedTuple):
     east: float  # m/s
 
 
-CALM = Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+CALM: Push = zeros(Push)()
 
 
 class Held(NamedTuple):
@@ -91,7 +91,7 @@ class Rates(NamedTuple):
     n: float
 
 
-NO_RATES = Rates(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_RATES: Rates = zeros(Rates)()
 
 
 def accelerations(
@@ -221,21 +221,8 @@ def stage(start: Motion, k: Rates, h: float, order: float, ship: Ship) -> Motion
     return after(start, k, h, rudder_after(start.delta, k.delta, order, h, ship))
 
 
-def add_rates(total: Rates, weight: float, k: Rates) -> Rates:
-    """Sum of rates and others times a weight."""
-    return Rates(
-        x=total.x + weight * k.x,
-        y=total.y + weight * k.y,
-        psi=total.psi + weight * k.psi,
-        u=total.u + weight * k.u,
-        v=total.v + weight * k.v,
-        r=total.r + weight * k.r,
-        p=total.p + weight * k.p,
-        phi=total.phi + weight * k.phi,
-        q=total.q + weight * k.q,
-        delta=total.delta + weight * k.delta,
-        n=total.n + weight * k.n,
-    )
+#: (total, weight, k): the sum of rates and others times a weight.
+add_rates = fieldwise(Rates, "total, weight, k", "total.{0} + weight * k.{0}")
 
 
 def start_of_step(motion: Motion, shaft: float) -> Motion:

@@ -7,6 +7,8 @@ instead, by a step of `DRAW` each.
 
 import numpy as np
 
+from shipgym.engine.record_code import polynomial
+
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 MIX_2 = np.uint64(0x94D049BB133111EB)
@@ -31,6 +33,15 @@ S31 = np.uint64(31)
 S32 = np.uint64(32)
 QUARTERS = np.uint64(0x0000FFFF0000FFFF)
 LOW_32 = np.uint64(0xFFFFFFFF)
+
+normal_series = polynomial(
+    "normal_series",
+    1.6670030710794617,
+    0.04695799541224908,
+    0.030027949208590633,
+    -0.018156674707275382,
+    0.005565249837221889,
+)
 
 
 def mix(word: np.uint64) -> np.uint64:
@@ -82,9 +93,4 @@ def normal(word: np.uint64, draw: np.uint64) -> float:
     pairs = even + odd
     total = np.int32((pairs & LOW_32) + (pairs >> S32))
     t = (float(total) - 131070.0) * (1.0 / 65536.0)
-    z = t * t
-    series = -0.018156674707275382 + z * 0.005565249837221889
-    series = 0.030027949208590633 + z * series
-    series = 0.04695799541224908 + z * series
-    series = 1.6670030710794617 + z * series
-    return t * series
+    return t * normal_series(t * t)

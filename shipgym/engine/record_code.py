@@ -134,6 +134,29 @@ def changer(record: type[R], *fields: str) -> Callable[..., R]:
     return written(f"change_{name}", arguments, body, {name: record})
 
 
+def polynomial(name: str, *coefficients: float) -> Callable[[float], float]:
+    """Write `NAME(z)`: coefficients by rising powers of z, by Horner's scheme.
+
+    `polynomial("cubic", 1.0, 2.0, 3.0)` is `lambda z: 1.0 + z * (2.0 + z * (3.0))`.
+    """
+    opening = " + z * (".join(map(repr, coefficients))
+    closing = ")" * (len(coefficients) - 1)
+    return written(name, "z", [f"return {opening}{closing}"], {})
+
+
+def fieldwise(record: type[R], arguments: str, value: str) -> Callable[..., R]:
+    """Write a function that makes a record, each field by an expression.
+
+    `fieldwise(Fix, "a, b", "a.{0} + b.{0}")` is the sum of two: `{0}` is the field.
+    """
+    known: Any = record
+    made = ", ".join(value.format(field) for field in known._fields)
+    name = record.__name__
+    return written(
+        f"made_{name}", arguments, [f"return {name}({made})"], {name: record}
+    )
+
+
 def _part(record: str, path: str) -> str:
     """Source of a number of a record at a path: `record.targets[0].x`."""
     return re.sub(r"\.(\d+)", r"[\1]", f"{record}.{path}")

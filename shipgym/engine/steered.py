@@ -40,32 +40,20 @@ def switched(
 ) -> Motion:
     """State after a step in which the rudder reverses when the heading has moved.
 
-    The instant is found by regula falsi on the heading after part of the step; the miss
-    of the end that stays is halved each time, as the Illinois variant does where an end
-    stays twice.
+    The instant is found by halving: fifty times, to rounding.
     """
     side = 1.0 if command > 0.0 else -1.0
-    end = sail_step(motion, command, n, h, pushed, coefficients, ship)
     low = 0.0
     high = 1.0
-    miss_low = side * motion.psi - threshold
-    miss_high = side * end.psi - threshold
-    part = 1.0
-    switch_iterations = 12
-    for _ in range(switch_iterations):
-        part = low - miss_low * (high - low) / (miss_high - miss_low)
+    halvings = 50
+    for _ in range(halvings):
+        part = 0.5 * (low + high)
         after = sail_step(motion, command, n, part * h, pushed, coefficients, ship)
-        miss = side * after.psi - threshold
-        if miss > 0.0:
-            high = part
-            miss_high = miss
-            miss_low = 0.5 * miss_low
-        elif miss < 0.0:
+        if side * after.psi < threshold:
             low = part
-            miss_low = miss
-            miss_high = 0.5 * miss_high
         else:
-            break
+            high = part
+    part = high
     crossing = sail_step(motion, command, n, part * h, pushed, coefficients, ship)
     rest = (1.0 - part) * h
     return sail_step(crossing, -command, n, rest, pushed, coefficients, ship)

@@ -118,14 +118,27 @@ class Criterion:
     trials, with 97.5 % certainty.
     """
 
-    limit: float  # largest value allowed
-    unit: str  # "ship lengths" or "deg"
-    source: str  # paragraph of the annex of MSC.137(76)
+    rule: Rule
     #: such as "35 deg turn", with the rudder's limit where that is less
     manoeuvre: str = ""
     # what is known on each; none where the ship's equations do not allow the test
     sides: tuple[Side, ...] = ()
     remark: str = ""
+
+    @property
+    def limit(self) -> float:
+        """Largest value allowed, in `unit`."""
+        return self.rule.limit
+
+    @property
+    def unit(self) -> str:
+        """Unit of the index: "ship lengths" or "deg"."""
+        return self.rule.unit
+
+    @property
+    def source(self) -> str:
+        """Paragraph of the annex of MSC.137(76)."""
+        return self.rule.source
 
     @cached_property
     def drawn(self) -> IndexInterval | None:
@@ -181,25 +194,6 @@ class Criterion:
         if not self.decided:
             return None
         return self._chances.passes > self._chances.fails
-
-    @property
-    def certainty(self) -> float | None:
-        """Certainty of the verdict."""
-        return max(self._chances) if self.decided else None
-
-    @property
-    def decided_by(self) -> str | None:
-        """Evidence for the verdict: "trials", "model" or "trials and model"."""
-        if not self.decided:
-            return None
-        measured = [side for side in self.sides if side.measured is not None]
-        if not measured:
-            return "model"
-        by_trials = chances_of(measured, self.limit)
-        all_measured = len(measured) == len(self.sides)
-        if all_measured or (by_trials.is_sure and not self.passed):
-            return "trials"
-        return "trials and model"
 
     @property
     def deciding_trials(self) -> tuple[str, ...]:
@@ -259,10 +253,10 @@ class Criterion:
     @property
     def probability(self) -> float | None:
         """Probability to pass, by trials and models drawn; None if undecided."""
-        certainty = self.certainty
         by_value = self.measured is None and self.share_passed is None
-        if by_value or certainty is None:
+        if by_value or not self.decided:
             return None
+        certainty = max(self._chances)
         return certainty if self.passed else 1.0 - certainty
 
     def to_dict(self) -> dict[str, Any]:
@@ -277,7 +271,6 @@ class Criterion:
             "interval_95": self.interval,
             "probability": self.probability,
             "decided": self.decided,
-            "decided_by": self.decided_by,
             "deciding_trials": list(self.deciding_trials),
             "passed": self.passed,
             "unit": self.unit,
@@ -285,33 +278,7 @@ class Criterion:
         }
         if self.note:
             fields["note"] = self.note
-        drawn = self.drawn
-        if drawn is not None and len(drawn.values):
-            (median,) = drawn.quantiles(0.5)
-            fields |= {
-                "median": median,
-                "draws": len(drawn.values),
-                "ran_away": drawn.n_ran_away,
-                "without_value": int(np.isnan(drawn.values).sum()),
-            }
         return fields
-
-
-def criterion_of(
-    rule: Rule, sides: Sequence[Side], manoeuvre: str = "", remark: str = ""
-) -> Criterion:
-    """A rule judged on the worse side; an incomplete run fails it.
-
-    `sides`: what is known of the index on each; `manoeuvre`: the trial in words.
-    """
-    return Criterion(
-        limit=rule.limit,
-        unit=rule.unit,
-        source=rule.source,
-        manoeuvre=manoeuvre,
-        sides=tuple(sides),
-        remark=remark,
-    )
 
 
 def side_in_words(manoeuvre: str, side: str) -> str:

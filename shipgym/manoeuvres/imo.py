@@ -8,7 +8,6 @@ from shipgym.checks import check_number
 from shipgym.manoeuvres.criteria import (
     Criterion,
     Side,
-    criterion_of,
     outside_envelope,
     with_measured,
 )
@@ -95,7 +94,7 @@ def imo_criteria(
                 )
                 sides.append(known)
         trial = trial_in_words(model, rule.manoeuvre)
-        criteria[criterion] = criterion_of(rule, sides, trial)
+        criteria[criterion] = Criterion(rule, trial, tuple(sides))
     stop = found.get(STOPPING.manoeuvre)
     criteria["stopping"] = stopping_criterion(model, stop)
     measured = measured_in_file(model)
@@ -112,16 +111,11 @@ def stopping_criterion(
             " Administration may allow up to 20"
         )
         side = Side(name="", drawn=stop[STOPPING.index])
-        return criterion_of(
-            STOPPING,
-            [side],
-            manoeuvre=STOPPING.manoeuvre,
-            remark=note,
-        )
+        return Criterion(STOPPING, STOPPING.manoeuvre, (side,), note)
     why = "its equations hold for a shaft turning ahead only"
     if "n" not in model.command_names:
         why = (
             "its thrust is inside its surge coefficients, so it cannot be ordered"
             " astern"
         )
-    return criterion_of(STOPPING, [], remark=f"not assessable: {why}")
+    return Criterion(STOPPING, remark=f"not assessable: {why}")

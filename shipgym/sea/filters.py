@@ -4,10 +4,15 @@ Steps are exact (Van Loan 1978, Computing integrals involving the matrix exponen
 the variance of a process does not depend on their length.
 """
 
-from math import sqrt
+from math import factorial, sqrt
 from typing import NamedTuple
 
 from shipgym.engine.mathematics import sin_cos
+from shipgym.engine.record_code import polynomial
+
+decay_series = polynomial(
+    "decay_series", *((-1.0) ** k / factorial(k) for k in range(8))
+)
 
 
 class GaussMarkov(NamedTuple):
@@ -60,14 +65,7 @@ def decay(x: float) -> float:
 
     It is the fourth power of the series of exp(-x / 4).
     """
-    y = 0.25 * min(x, 8.0)
-    series = 1.0 / 720.0 - y * (1.0 / 5040.0)
-    series = 1.0 / 120.0 - y * series
-    series = 1.0 / 24.0 - y * series
-    series = 1.0 / 6.0 - y * series
-    series = 1.0 / 2.0 - y * series
-    series = 1.0 - y * series
-    quarter = 1.0 - y * series
+    quarter = decay_series(0.25 * min(x, 8.0))
     return quarter * quarter * quarter * quarter
 
 

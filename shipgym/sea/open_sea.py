@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from shipgym.engine.compiled_ship import CompiledSea
 from shipgym.engine.mathematics import sin_cos
-from shipgym.engine.motion import HAS_ROLL, HAS_SEA, Motion, Push
+from shipgym.engine.motion import CALM, HAS_ROLL, HAS_SEA, Motion, Push
 from shipgym.engine.random import DRAW, S11, TO_UNIT, mix, normal
 from shipgym.engine.record_code import changer
 from shipgym.sea.filters import (
@@ -143,7 +143,7 @@ def relative_wind(
 def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
     """Accelerations by wind and waves now, and the current; none in calm water."""
     if not HAS_SEA:
-        return Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return CALM
     sine, cosine = sin_cos(motion.psi)
     felt = relative_wind(motion, sine, cosine, sea, p)
     wind = by_wind(motion, felt, p)

@@ -19,6 +19,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.engine.mathematics import arctan2, exponential, small_sin_cos
 from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.record_code import polynomial
 from shipgym.ships.equations import ShipEquations, record_of
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.reference_ships import published_ships
@@ -181,22 +182,17 @@ class Flow(NamedTuple):
     K_T_nn: float  # thrust coefficient by (n D)^2
 
 
+# artanh(z) / z = 1 + s / 3 + s^2 / 5 + ..., where s = z^2
+artanh_series = polynomial("artanh_series", *(1.0 / (2.0 * k + 1.0) for k in range(8)))
+
+
 def power_law(x: float, power: float) -> float:
     """Power of a speed by service speed, by the series of artanh at its eighth root."""
     least, most = 0.01, 4.0  # for which the series is good enough
     within = min(max(x, least), most)
     root = sqrt(sqrt(sqrt(within)))
     z = (root - 1.0) / (root + 1.0)
-    s = z * z
-    # artanh(z) / z = 1 + s / 3 + s^2 / 5 + ... + s^7 / 15
-    series = 1.0 / 13.0 + s / 15.0
-    series = 1.0 / 11.0 + s * series
-    series = 1.0 / 9.0 + s * series
-    series = 1.0 / 7.0 + s * series
-    series = 1.0 / 5.0 + s * series
-    series = 1.0 / 3.0 + s * series
-    series = 1.0 + s * series
-    return exponential(power * 16.0 * z * series)
+    return exponential(power * 16.0 * z * artanh_series(z * z))
 
 
 def accelerations(
