@@ -26,10 +26,10 @@ from shipgym.ships.hull_formulas import (
     YOSHIMURA,
     completed,
     formula_coefficients,
-    main_dimensions,
     self_propulsion,
 )
 from shipgym.ships.mmg import IDENTIFIED, standard_form
+from shipgym.ships.particulars import main_dimensions
 from shipgym.ships.structures import MMG
 
 #: Standard deviations of the coefficients before any trial, about a reference ship and

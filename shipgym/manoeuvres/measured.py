@@ -73,17 +73,14 @@ def measured_in_file(model: ShipModel) -> list[tuple[str, MeasuredIndex]]:
         names = check_table(indices, f"{where} {trial}", RULES)
         for name, given in names.items():
             own = f"{where} {trial} {name}"
-            values = check_table(given, own, known)
+            values = check_table(given, own, known, known[:3])
+            value = check_number(values["value"], f"{own} value")
+            error = check_number(values["error"], f"{own} error", at_least=0.0)
+            side = check_choice(values["side"], ("starboard", "port"), f"{own} side")
             predicted = values.get("predicted")
             if predicted is not None:
                 check_number(predicted, f"{own} predicted")
-            index = MeasuredIndex(
-                check_number(values.get("value"), f"{own} value"),
-                check_number(values.get("error"), f"{own} error", at_least=0.0),
-                check_choice(values.get("side"), ("starboard", "port"), f"{own} side"),
-                predicted,
-            )
-            found.append((name, index))
+            found.append((name, MeasuredIndex(value, error, side, predicted)))
     return found
 
 
@@ -102,7 +99,7 @@ def measured_indices(
             name: rule for name, rule in RULES.items() if rule.manoeuvre == manoeuvre
         }
         found = _with_errors(model, trial, rules)
-        predicted = {} if simulated is None else _values(model, simulated, rules)
+        predicted = _values(model, simulated, rules) if simulated and found else {}
     except InputError:  # a channel such as the position is missing
         return {}
     return {
@@ -122,23 +119,14 @@ def _with_errors(
     period = 0.7 * model.travel_time
     smooth, noise = smoothed(trial, period)
     values = _values(model, smooth, rules)
-    repeated = []
-    for again in _repetitions(smooth, noise, period):
-        found_again = _values(model, again, rules)
-        repeated.append(found_again)
-
+    repetitions = _repetitions(smooth, noise, period)
+    repeated = [_values(model, again, rules) for again in repetitions]
     found = {}
     side = first_side(trial)
     for name, value in values.items():
-        others = [again.get(name, value) for again in repeated]
-        scatter = float(np.std(others))
+        scatter = np.std([again.get(name, value) for again in repeated])
         unseen = _unseen_error(model, trial, noise, rules[name])
-        error = float(np.hypot(scatter, unseen))
-        found[name] = MeasuredIndex(
-            value=value,
-            error=error,
-            side=side,
-        )
+        found[name] = MeasuredIndex(value, float(np.hypot(scatter, unseen)), side)
     return found
 
 
@@ -147,22 +135,12 @@ def _values(model: ShipModel, trial: Trial, rules: dict[str, Rule]) -> dict[str,
     length = model.particulars["length"]
     indices: Any
     if trial.kind == "zigzag":
-        heading_deg = _standard_heading(trial)
-        indices = zigzag_indices(trial, length, heading_deg)
+        _, _, heading_deg = next(iter(rules.values())).manoeuvre.rpartition("/")
+        indices = zigzag_indices(trial, length, float(heading_deg))
     else:
         indices = turning_indices(trial, length)
-    values = {}
-    for name, rule in rules.items():
-        value = getattr(indices, rule.index)
-        if value is not None:
-            values[name] = value
-    return values
-
-
-def _standard_heading(trial: Trial) -> float:
-    """Standard heading of a zigzag that is nearest to that of its first reversal."""
-    found = switch_heading_deg(trial) or 0.0
-    return min(STANDARD_DEG, key=lambda angle: abs(angle - found))
+    values = {name: getattr(indices, rule.index) for name, rule in rules.items()}
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def smoothed(trial: Trial, period: float) -> tuple[Trial, dict[str, float]]:
@@ -218,18 +196,15 @@ def _repetitions(smooth: Trial, noise: dict[str, float], period: float) -> list[
     rng = np.random.default_rng(0)
     repetitions = 30
     shape = (len(smooth), repetitions)
-    left = {}
-    for name, size in noise.items():
-        white = size * rng.standard_normal(shape)
-        left[name] = _low_pass(name, smooth.t, white, period)
+    left = {
+        name: _low_pass(name, smooth.t, size * rng.standard_normal(shape), period)
+        for name, size in noise.items()
+    }
 
     trials = []
     for k in range(repetitions):
-        channels = {}
-        for name, columns in left.items():
-            channels[name] = smooth[name] + columns[:, k]
-        again = smooth.with_channels(channels)
-        trials.append(again)
+        channels = {name: smooth[name] + left[name][:, k] for name in noise}
+        trials.append(smooth.with_channels(channels))
     return trials
 
 

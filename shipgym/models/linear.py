@@ -6,7 +6,8 @@ Hydrodynamics and Motion Control, 7.2 (second-order transfer function, T = T1 + 
 T3).
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -28,21 +29,18 @@ class StraightRunning:
     surge: float
     sway: float
     rudder: float  # the neutral rudder, rad, positive to starboard
-    heel: float = 0.0  # rad, starboard down; 0 where the model knows no roll
-    shaft_speed: float = 0.0  # 1/s; 0 where the model's shaft has no dynamics
-    # yaw acceleration that a table with a memory `q` keeps, rad/s^2
-    memory: float = 0.0
+    # of heel, shaft and memory of yaw, by the names of states
+    others: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def named(self) -> dict[str, float]:
+        """States by name; those that are absent are 0."""
+        own = {"u": self.surge, "v": self.sway, "delta": self.rudder}
+        return {**self.others, **own}
 
     def state(self, model: ShipModel) -> Floats:
         """The state vector, in the order of `model.state_names`, shape (n_state,)."""
-        values = {
-            "u": self.surge,
-            "v": self.sway,
-            "delta": self.rudder,
-            "phi": self.heel,
-            "n": self.shaft_speed,
-            "q": self.memory,
-        }
+        values = self.named
         return np.array([values.get(name, 0.0) for name in model.state_names])
 
 
@@ -95,14 +93,8 @@ def straight_running(model: ShipModel) -> StraightRunning:
             " identify it from trials that turn to both sides, or check the sign of the"
             " rudder"
         )
-    return StraightRunning(
-        surge=found["u"],
-        sway=found["v"],
-        rudder=found["delta"],
-        heel=found.get("phi", 0.0),
-        shaft_speed=found.get("n", 0.0),
-        memory=found.get("q", 0.0),
-    )
+    others = {name: found[name] for name in ("phi", "n", "q") if name in found}
+    return StraightRunning(found["u"], found["v"], found["delta"], others)
 
 
 def _feels_speed(model: ShipModel) -> bool:
@@ -198,8 +190,7 @@ def _jacobian(
     """Derivatives of rates by states and rudder, prime system, by the names of both."""
     step = 1e-4  # prime system; the error of central differences is its square
     units = _units(model)
-    values = at.state(model).tolist()
-    state = dict(zip(model.state_names, values, strict=True))
+    state = dict.fromkeys(model.state_names, 0.0) | at.named
 
     def rates_off(name: str, step: float) -> dict[str, float]:
         off = dict(state)

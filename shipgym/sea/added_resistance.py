@@ -6,8 +6,7 @@ from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 from shipgym.constants import GRAVITY
-from shipgym.sea.estimates import Hull, hull_of
-from shipgym.ships.particulars import Particulars
+from shipgym.ships.particulars import MainDimensions, Particulars, main_dimensions
 
 #: Radius of gyration in pitch by length.
 PITCH_GYRADIUS = 0.25
@@ -27,7 +26,7 @@ def added_resistance(
     number as at most 0.4. `omega`, rad/s, is of the waves; `chi`, 0 to pi, where they
     come from, seen from the bow; `speed`, m/s, the ship's.
     """
-    hull = hull_of(ship)
+    hull = main_dimensions(ship)
     U = min(speed, 0.4 * float(sqrt(GRAVITY * hull.L)))
     omega, chi = np.broadcast_arrays(
         np.asarray(omega, dtype=float),
@@ -47,13 +46,13 @@ def end_angle(ship: Particulars) -> float:
     buoyancy at midship, and an entrance as long. CP = CB / CM with the midship
     coefficient CM = 1.006 - 0.0056 CB^(-3.56) of Kerlen 1970.
     """
-    L, B, _, CB = hull_of(ship)
+    L, B, _, CB = main_dimensions(ship)
     CM = 1.006 - 0.0056 * CB**-3.56
     CP = min(CB / CM, 0.95)
     return float(np.arctan(0.495 * B / (L * (1.0 - CP))))
 
 
-def _radiated(omega: Floats, chi: Floats, hull: Hull, U: float) -> Floats:
+def _radiated(omega: Floats, chi: Floats, hull: MainDimensions, U: float) -> Floats:
     """Part of the ship's motions by rho g, equations G-14 to G-22.
 
     3859.2 B^2 / L CB^1.34 k_yy^2 a1 a2 w^b1 exp(b1 / d1 (1 - w^d1))
@@ -79,12 +78,14 @@ def _radiated(omega: Floats, chi: Floats, hull: Hull, U: float) -> Floats:
     return radiated
 
 
-def _slenderness(hull: Hull) -> float:
+def _slenderness(hull: MainDimensions) -> float:
     """ln(B / T)."""
     return float(log(max(hull.B / hull.T, 2.0)))
 
 
-def _reduced_frequency(omega: Floats, chi: Floats, hull: Hull, U: float) -> Floats:
+def _reduced_frequency(
+    omega: Floats, chi: Floats, hull: MainDimensions, U: float
+) -> Floats:
     """Frequency of the waves by that of the largest resistance."""
     L, _, _, CB = hull
     Fr = U / sqrt(GRAVITY * L)
@@ -105,7 +106,7 @@ def _reduced_frequency(omega: Floats, chi: Floats, hull: Hull, U: float) -> Floa
 
 
 def _amplitudes(
-    omega: Floats, chi: Floats, hull: Hull, U: float
+    omega: Floats, chi: Floats, hull: MainDimensions, U: float
 ) -> tuple[Floats, Floats]:
     """Factors a1 and a2.
 
@@ -125,7 +126,9 @@ def _amplitudes(
     return a1 / _slenderness(hull), a2
 
 
-def _amplitudes_astern(omega: Floats, hull: Hull, U: float) -> tuple[Floats, Floats]:
+def _amplitudes_astern(
+    omega: Floats, hull: MainDimensions, U: float
+) -> tuple[Floats, Floats]:
     """Factors a1, still times the slenderness, and a2 in waves from astern."""
     bluntness = 0.87 / hull.CB
     group_velocity = GRAVITY / (2.0 * omega)
@@ -148,7 +151,9 @@ def speed_factor(Fr: ArrayLike) -> Floats:
     return where(Fr < 0.12, slow, fast)
 
 
-def _reflected(omega: Floats, chi: Floats, hull: Hull, E: float, U: float) -> Floats:
+def _reflected(
+    omega: Floats, chi: Floats, hull: MainDimensions, E: float, U: float
+) -> Floats:
     """Part of the reflection at bow and stern by rho g, equations G-23 to G-31."""
     L, B, T, CB = hull
     c = cos(chi)

@@ -10,7 +10,7 @@ from shipgym.arrays import Floats
 from shipgym.constants import GRAVITY
 from shipgym.sea.added_resistance import added_resistance
 from shipgym.sea.conditions import Waves
-from shipgym.sea.estimates import hull_of, weather_particulars
+from shipgym.sea.estimates import weather_particulars
 from shipgym.sea.harmonics import circle, half_circle, mirrored
 from shipgym.sea.waves import (
     draught_attenuation,
@@ -19,7 +19,7 @@ from shipgym.sea.waves import (
     slow_drift,
     wave_spectrum,
 )
-from shipgym.ships.particulars import Particulars
+from shipgym.ships.particulars import Particulars, main_dimensions
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def waterline(ship: Particulars) -> tuple[Floats, Floats]:
     waterplane coefficient, waterplane area by length * beam, is p / (p + 1) and
     estimated as (1 + 2 CB) / 3 (Schneekluth & Bertram 1998, section 1.6).
     """
-    hull = hull_of(ship)
+    hull = main_dimensions(ship)
     CWP = (1.0 + 2.0 * hull.CB) / 3.0
     p = CWP / (1.0 - CWP)
     from_bow = np.linspace(0.0, pi, 401)

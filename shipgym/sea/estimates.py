@@ -1,29 +1,14 @@
 """Particulars that wind and waves need, estimated where they are not given."""
 
 import math
-from typing import NamedTuple
 
 from shipgym.errors import InputError
-from shipgym.ships.particulars import Estimates, Particulars, with_estimates
-
-
-class Hull(NamedTuple):
-    """Main dimensions of a ship in the symbols of the formulas, SI units."""
-
-    L: float  # length between perpendiculars
-    B: float  # beam
-    T: float  # draught
-    CB: float  # block coefficient
-
-
-def hull_of(ship: Particulars) -> Hull:
-    """Main dimensions of a ship that has all that the weather needs."""
-    return Hull(
-        L=ship.length,
-        B=ship.require("beam"),
-        T=ship.require("draught"),
-        CB=ship.require("block_coefficient"),
-    )
+from shipgym.ships.particulars import (
+    Estimates,
+    Particulars,
+    main_dimensions,
+    with_estimates,
+)
 
 
 def weather_particulars(particulars: Particulars) -> Particulars:
@@ -63,7 +48,7 @@ def weather_particulars(particulars: Particulars) -> Particulars:
 
 def freeboard(ship: Particulars) -> float:
     """Estimated height of the deck above the water, m."""
-    hull = hull_of(ship)
+    hull = main_dimensions(ship)
     return hull.T * (1.3 - 1.05 * hull.CB)
 
 
@@ -103,7 +88,7 @@ def _centroid_height(ship: Particulars) -> float:
 
 
 def _roll_period(ship: Particulars) -> float:
-    L, B, T, _ = hull_of(ship)
+    L, B, T, _ = main_dimensions(ship)
     # the Code's length is in metres and of ships: smaller hulls, as models, are taken
     # for one of 100 m
     L = max(L, 100.0)

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 from shipgym.sea.conditions import Waves
-from shipgym.sea.estimates import hull_of, weather_particulars
+from shipgym.sea.estimates import weather_particulars
 from shipgym.sea.harmonics import circle, half_circle, mirrored
 from shipgym.sea.waves import (
     frequencies,
@@ -15,7 +15,7 @@ from shipgym.sea.waves import (
     wave_number,
     wave_spectrum,
 )
-from shipgym.ships.particulars import Particulars
+from shipgym.ships.particulars import Particulars, main_dimensions
 
 
 def heading_response(
@@ -32,7 +32,7 @@ def heading_response(
     """
     from scipy.special import spherical_jn
 
-    hull = hull_of(particulars)
+    hull = main_dimensions(particulars)
     k = wave_number(omega)
     q = abs(0.5 * k * hull.L * cos(chi))
     attenuation = exp(-0.5 * k * hull.T)
@@ -51,7 +51,7 @@ def effective_wave_slope(
     Transactions of RINA 111; Lloyd 1989, Seakeeping). In long waves it is the wave
     slope across the ship. Arguments are those of :func:`heading_response`.
     """
-    hull = hull_of(particulars)
+    hull = main_dimensions(particulars)
     k = wave_number(omega)
     sine = sin(chi)
     cosine = cos(chi)

@@ -6,18 +6,25 @@ container ship, J. Soc. Naval Architects of Japan 150; in the form of the functi
 instantaneous speed; u' is the total surge speed over U.
 """
 
+from collections import Counter
+from collections.abc import Callable
 from math import copysign, fabs, pi, sqrt
 from typing import Any, NamedTuple
 
 from shipgym.engine.mathematics import small_sin_cos
 from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.record_code import written
 from shipgym.ships.equations import ShipEquations, published
+from shipgym.ships.term_functions import factored
 
 LENGTH = 175.0  # m
 WEIGHT = 9.81 * 21222.0  # by density, m^4/s^2, of the displaced volume
 RUDDER_AREA = 33.0376  # m^2
 ASPECT_RATIO = 1.8219
 DIAMETER = 6.533  # of the propeller, m
+
+#: Of sway, turn, roll and heel, in the forces of the hull.
+TERMS = ("v", "r", "p", "f", "vvv", "vvr", "vvf", "rrr", "vrr", "rrf", "vff", "rff")
 
 #: As published (`reference_ships.json`); without unit but for the metacentric height.
 PUBLISHED = published("container", __name__)
@@ -27,11 +34,26 @@ Coefficients = PUBLISHED["coefficients_record"]
 class State(NamedTuple):
     """Motion in the prime system."""
 
-    u: float
     v: float
     r: float
     p: float
-    phi: float
+    f: float  # heel
+
+
+def hull(axis: str) -> Callable[[State, Any], float]:
+    """Write the force or moment of the hull about an axis by its coefficients.
+
+    To third order in sway, turn and heel, linear in roll.
+    """
+    monomials = [(f"c.{axis}_{term}", Counter(term)) for term in TERMS]
+    makings = [f"{name} = at.{name}" for name in State._fields]
+    body = [*makings, f"return {factored(monomials)}"]
+    return written(f"hull_{axis}", "at, c", body, {})
+
+
+sway_force = hull("Y")
+roll_moment = hull("K")
+yaw_moment = hull("N")
 
 
 def accelerations(
@@ -54,52 +76,10 @@ def accelerations(
     weight = WEIGHT / (0.5 * L * L)
     W_GM = (weight * c.GM / L) * per_U * per_U
 
-    at = State(u, v, r, p, phi)
-    Y_H = hull(
-        at,
-        c.Y_v,
-        c.Y_r,
-        c.Y_p,
-        c.Y_f,
-        c.Y_vvv,
-        c.Y_vvr,
-        c.Y_vvf,
-        c.Y_rrr,
-        c.Y_vrr,
-        c.Y_rrf,
-        c.Y_vff,
-        c.Y_rff,
-    )
-    K_H = hull(
-        at,
-        c.K_v,
-        c.K_r,
-        c.K_p,
-        c.K_f,
-        c.K_vvv,
-        c.K_vvr,
-        c.K_vvf,
-        c.K_rrr,
-        c.K_vrr,
-        c.K_rrf,
-        c.K_vff,
-        c.K_rff,
-    )
-    N_H = hull(
-        at,
-        c.N_v,
-        c.N_r,
-        c.N_p,
-        c.N_f,
-        c.N_vvv,
-        c.N_vvr,
-        c.N_vvf,
-        c.N_rrr,
-        c.N_vrr,
-        c.N_rrf,
-        c.N_vff,
-        c.N_rff,
-    )
+    at = State(v, r, p, phi)
+    Y_H = sway_force(at, c)
+    K_H = roll_moment(at, c)
+    N_H = yaw_moment(at, c)
     X = (
         c.X_uu * u * u
         + (1.0 - c.t) * T
@@ -180,39 +160,6 @@ def rudder_force(
     slope = 6.13 * ASPECT_RATIO / (ASPECT_RATIO + 2.25)
     area = RUDDER_AREA / (LENGTH * LENGTH)
     return -slope * area * (U_R * across), sine, cosine
-
-
-def hull(
-    at: State,
-    v: float,
-    r: float,
-    p: float,
-    f: float,
-    vvv: float,
-    vvr: float,
-    vvf: float,
-    rrr: float,
-    vrr: float,
-    rrf: float,
-    vff: float,
-    rff: float,
-) -> float:
-    """Force or moment of the hull by its coefficients.
-
-    To third order in sway, turn and heel, linear in roll.
-    """
-    vv = at.v * at.v
-    rr = at.r * at.r
-    ff = at.phi * at.phi
-    return (
-        v * at.v
-        + r * at.r
-        + p * at.p
-        + f * at.phi
-        + vv * (vvv * at.v + vvr * at.r + vvf * at.phi)
-        + rr * (rrr * at.r + vrr * at.v + rrf * at.phi)
-        + ff * (vff * at.v + rff * at.r)
-    )
 
 
 def shaft_acceleration(n: float, command: float, c: Any, ship: Ship) -> float:

@@ -17,31 +17,12 @@ rho L^2 d / 2, the moment of inertia by rho L^4 d / 2.
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from shipgym.ships.mmg import SHIP, dimensions
-from shipgym.ships.particulars import ADDED_MASSES, Particulars
+from shipgym.ships.particulars import ADDED_MASSES, Particulars, main_dimensions
 
 YOSHIMURA = "yoshimura"
-
-
-class MainDimensions(NamedTuple):
-    """Main dimensions of a hull, by the symbols of the formulas."""
-
-    L: float  # length between perpendiculars, m
-    B: float  # beam, m
-    T: float  # draught, m
-    C_b: float  # block coefficient
-
-
-def main_dimensions(ship: Particulars) -> MainDimensions:
-    """Main dimensions of a ship; InputError where one of them is not known."""
-    return MainDimensions(
-        L=ship.length,
-        B=ship.require("beam"),
-        T=ship.require("draught"),
-        C_b=ship.require("block_coefficient"),
-    )
 
 
 def completed(particulars: Particulars) -> Particulars:
@@ -56,9 +37,7 @@ def completed(particulars: Particulars) -> Particulars:
     given = ship.estimated - no_added_masses.keys()
     ship = replace(ship, **no_added_masses, estimated=given)
 
-    L = ship.length
-    B = ship.require("beam")
-    T = ship.require("draught")
+    L, B, T, _ = main_dimensions(ship)
     usual_area = L * T / 100.0 * (1.0 + 25.0 * (B / L) ** 2)
     area = ship.rudder_area or usual_area
     span = 0.76 * T
@@ -175,7 +154,7 @@ def resistance(ship: Particulars) -> float:
 
 def _propeller(ship: Particulars) -> dict[str, float]:
     """Wake by Taylor; thrust k_0 + k_1 J + k_2 J^2 of Wageningen B4-50 by pitch."""
-    C_b = main_dimensions(ship).C_b
+    C_b = main_dimensions(ship).CB
     P = ship.propeller_pitch_ratio or 0.8  # the usual one
     several = ship.propellers is not None and ship.propellers > 1.0
     wake = 0.55 * C_b - 0.20 if several else 0.5 * C_b - 0.05

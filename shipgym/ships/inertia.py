@@ -4,7 +4,7 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
-from shipgym.ships.particulars import Particulars, prime_inertia
+from shipgym.ships.particulars import Particulars, prime_inertia, total_inertia
 from shipgym.ships.term_table import Structure
 
 
@@ -28,15 +28,6 @@ def inertia(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
         prime = model.dynamics.prime_inertia(model.coefficients, p)
         return _mass_unit(p) * _with_arms(prime, p)
     return particulars_inertia(p)
-
-
-def rigid_inertia(model: ManoeuvringModel) -> tuple[float, float, float]:
-    """Mass, kg, static moment, kg m, and yaw inertia, kg m2, about midship."""
-    p = model.particulars.completed()
-    mass = p.require("mass")
-    xg = p.require("xg")
-    yaw = mass * (p.require("yaw_gyradius") ** 2 + xg**2)
-    return mass, mass * xg, yaw
 
 
 def _mass_unit(p: Particulars) -> float:
@@ -67,15 +58,11 @@ def _container(model: ManoeuvringModel) -> Floats:
 def _mmg(model: ManoeuvringModel) -> Floats:
     """Yasukawa & Yoshimura 2015: by rho L^2 d / 2, yaw inertia by rho L^4 d / 2."""
     c = model.coefficients
-    p = model.particulars
-    L = p.length
-    unit = 0.5 * p.require("water_density") * L**2 * p.require("draught")
-    m, m_xG, I_z = rigid_inertia(model)
-    added = np.array([c["mx"], c["my"], c["Jz"] * L**2])
-    total = np.eye(3, 4)
-    total[range(3), range(3)] = np.array([m, m, I_z]) + unit * added
-    total[1, 2] = total[2, 1] = m_xG
-    return total
+    p = model.particulars.completed()
+    slender = p.require("draught") / p.length
+    added = -slender * np.diag([c["mx"], c["my"], c["Jz"]])
+    problem = "added masses mx, my, Jz: expected a positive inertia, got none"
+    return _mass_unit(p) * _with_arms(total_inertia(p, added, problem), p)
 
 
 def _tanker(model: ManoeuvringModel, water_depth: float) -> Floats:

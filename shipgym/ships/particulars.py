@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import partial
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -293,6 +293,25 @@ def with_estimates(ship: Particulars, estimates: Estimates) -> Particulars:
             fields: dict[str, Any] = {name: value, "estimated": marked}
             ship = replace(ship, **fields)
     return ship
+
+
+class MainDimensions(NamedTuple):
+    """Main dimensions of a ship in the symbols of formulas, m."""
+
+    L: float  # length between perpendiculars
+    B: float  # beam
+    T: float  # draught
+    CB: float  # block coefficient
+
+
+def main_dimensions(ship: Particulars) -> MainDimensions:
+    """Main dimensions of a ship; InputError where one of them is not known."""
+    return MainDimensions(
+        L=ship.length,
+        B=ship.require("beam"),
+        T=ship.require("draught"),
+        CB=ship.require("block_coefficient"),
+    )
 
 
 def clarke_added_masses(
