@@ -1,11 +1,8 @@
-"""Code of tasks that is refused: foreign random numbers, writing to a plan."""
+"""Code of tasks that is refused: random numbers that are not the episode's."""
 
-import ast
-import inspect
 import random
 from collections.abc import Iterator
 from dis import Instruction, get_instructions
-from textwrap import dedent
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
@@ -90,28 +87,6 @@ def _module_of(value: Any) -> str:
     if isinstance(owner, _GENERATORS):
         return "random" if isinstance(owner, random.Random) else "numpy.random"
     return ""
-
-
-def refuse_writes_to_plan(function: FunctionType) -> None:
-    """Refuse a function that writes to `plan`, with file and line.
-
-    Next to a plan are the numbers of other ships.
-    """
-    code = function.__code__
-    try:
-        tree = ast.parse(dedent(inspect.getsource(function)))
-    except (OSError, SyntaxError):
-        return
-    for node in ast.walk(tree):
-        if not isinstance(node, ast.Subscript) or isinstance(node.ctx, ast.Load):
-            continue
-        if ast.unparse(node.value) == "plan":
-            line = code.co_firstlineno + node.lineno - 1
-            raise InputError(
-                f"{code.co_filename}, line {line}, in {code.co_name}: expected a plan"
-                " that is only read here, got one that is written; write it in begin or"
-                " on_event"
-            )
 
 
 def _is_users(value: Any) -> bool:

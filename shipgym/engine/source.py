@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from inspect import getsourcefile, getsourcelines
 from numbers import Real
 from pathlib import Path
 from typing import Any, get_args, get_origin
@@ -24,7 +23,7 @@ from shipgym.engine.records import (
 )
 from shipgym.errors import InputError
 from shipgym.python_files import asked, check_function, load_file, refuse_closure
-from shipgym.refused_code import refuse_foreign_random, refuse_writes_to_plan
+from shipgym.refused_code import refuse_foreign_random
 
 UNBOUNDED = Setting("")
 
@@ -82,8 +81,6 @@ def check_namespace(
         place = f"{where}: {name}"
         check_function(function, len(arguments), place, what, extras)
         refuse_foreign_random(function)
-        if extras:
-            refuse_writes_to_plan(function)
         found[name] = function
     return found
 
@@ -111,7 +108,7 @@ def _check_record(record: Any, name: str, where: str) -> None:
 
     numbers = (float, int, bool)
     for field, kind in kinds.items():
-        place = f"{field_place(record, field, where)}: {name}.{field}"
+        place = f"{where}: {name}.{field}"
         default = record._field_defaults.get(field)
         may_be_list = name == "Settings" and field == list(kinds)[-1]
         if not (is_list(kind) and may_be_list) or get_origin(kind) is tuple:
@@ -127,12 +124,10 @@ def _check_defaults(record: Any, where: str) -> None:
     """Refuse settings without a default, or with one beyond their bounds."""
     for field in record._fields:
         if field not in record._field_defaults:
-            place = field_place(record, field, where)
-            raise InputError(f"{place}: Settings.{field}: expected a default, got none")
+            raise InputError(f"{where}: Settings.{field}: expected a default, got none")
     for field, kind, setting, default in keywords(record):
         if not is_list(kind):
-            place = field_place(record, field, where)
-            name = f"{place}: Settings.{field}: default"
+            name = f"{where}: Settings.{field}: default"
             _setting_of(kind, default, name, setting)
 
 
@@ -145,22 +140,6 @@ def _check_kind(kind: Any, name: str, place: str) -> None:
             _check_kind(entry, name, place)
     elif is_list(kind):
         raise unexpected(place, "a float, or an array of a fixed size", kind)
-
-
-def field_place(record: Any, field: str, where: str) -> str:
-    """Return file and line of a field of a record; `where` alone if it is no file."""
-    if ".py" not in where:
-        return where
-    try:
-        lines, first = getsourcelines(record)
-        file = getsourcefile(record)
-    except (OSError, TypeError):
-        return where
-    for number, line in enumerate(lines, max(first, 1)):
-        name, _, _ = line.strip().partition(":")
-        if name.rstrip() == field:
-            return f"{file}, line {number}"
-    return where
 
 
 @dataclass(frozen=True)

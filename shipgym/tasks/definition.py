@@ -36,7 +36,6 @@ from shipgym.engine.source import (
     Configurable,
     annotated,
     check_namespace,
-    field_place,
     read_source,
 )
 from shipgym.engine.specialise import is_shipped
@@ -276,8 +275,7 @@ def _definition(source: Any) -> TaskDefinition:
     _check_task(namespace, where)
     definition = _definition_of(namespace, where)
     for path, spec in definition.observations.items():
-        place = field_place(definition.Observation, path.partition(".")[0], where)
-        _check_observation(spec, f"{place}: Observation.{path}")
+        _check_observation(spec, f"{where}: Observation.{path}")
     _check_names(definition)
     return definition
 
