@@ -9,7 +9,8 @@ from identification.samples.velocities import CURRENT_COLUMNS
 from shipgym import Particulars, Trial
 from shipgym.arrays import Floats
 from shipgym.models.simulate import WIND
-from shipgym.sea.wind import AIR_DENSITY, WindCurves, wind_curves
+from shipgym.sea.harmonics import Curves, circle
+from shipgym.sea.wind import AIR_DENSITY, wind_curves
 from shipgym.ships.inertia import particulars_inertia
 from shipgym.trials.navigation import rotate_to_body
 
@@ -52,7 +53,7 @@ def measured_wind(
     return trial.with_channels(dict(zip(WIND.values(), accelerations, strict=True)))
 
 
-def _forces_on(trial: Trial, curves: WindCurves, relative: bool) -> Floats:
+def _forces_on(trial: Trial, curves: Curves, relative: bool) -> Floats:
     """X, Y and N by the wind of a trial, shape (3, n_samples)."""
     ahead, aside = _felt_wind(trial, relative)
     forces = _forces(
@@ -67,11 +68,11 @@ def _forces_on(trial: Trial, curves: WindCurves, relative: bool) -> Floats:
     return forces
 
 
-def _forces(curves: WindCurves, ahead: Floats, aside: Floats) -> Floats:
+def _forces(curves: Curves, ahead: Floats, aside: Floats) -> Floats:
     """X, Y and N by a wind felt from ahead and starboard, shape (3, n_samples)."""
     angle = np.arctan2(aside, ahead)
     coefficients = [
-        np.interp(angle, curves.angle, row, period=2.0 * np.pi)
+        np.interp(angle, circle(), row, period=2.0 * np.pi)
         for row in (curves.X, curves.Y, curves.N)
     ]
     return 0.5 * AIR_DENSITY * (ahead**2 + aside**2) * np.array(coefficients)

@@ -4,12 +4,10 @@ from .conditions import Waves as Waves
 from .conditions import Weather as Weather
 from .conditions import Wind as Wind
 from .conditions import sea_states as sea_states
-from .drift import WaveDrift as WaveDrift
 from .drift import wave_drift as wave_drift
 from .estimates import weather_particulars as weather_particulars
-from .motions import WaveMotion as WaveMotion
+from .harmonics import Curves as Curves
 from .motions import wave_motion as wave_motion
 from .waves import jonswap as jonswap
 from .wind import AIR_DENSITY as AIR_DENSITY
-from .wind import WindCurves as WindCurves
 from .wind import wind_curves as wind_curves

@@ -1,7 +1,5 @@
 """Mean second-order wave forces on a ship, over the direction of the waves."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy import cos, pi, sin, trapezoid
 from numpy.typing import ArrayLike
@@ -11,40 +9,17 @@ from shipgym.constants import GRAVITY
 from shipgym.sea.added_resistance import added_resistance
 from shipgym.sea.conditions import Waves
 from shipgym.sea.estimates import weather_particulars
-from shipgym.sea.harmonics import circle, half_circle, mirrored
+from shipgym.sea.harmonics import Curves, circle, half_circle, mirrored
 from shipgym.sea.waves import (
     draught_attenuation,
     frequencies,
     over_directions,
-    slow_drift,
     wave_spectrum,
 )
 from shipgym.ships.particulars import Particulars, main_dimensions
 
 
-@dataclass(frozen=True)
-class WaveDrift:
-    """Mean wave drift over the direction of the waves, and its slow variation.
-
-    The force at any time is the mean one times (1 + s), s the Gauss-Markov process that
-    is given here.
-    """
-
-    # shape (points,), 0 to below 2 pi; where waves come from, seen from the bow, pi / 2
-    # from starboard; rad
-    chi: Floats
-    # shape (points,); mean surge and sway force, N. Waves from starboard push to port:
-    # Y < 0
-    X: Floats
-    Y: Floats
-    # shape (points,); mean yaw moment about midship, positive to starboard, N m
-    N: Floats
-    # of the slow variation, s and without unit
-    time_constant: float
-    standard_deviation: float
-
-
-def wave_drift(waves: Waves, particulars: Particulars) -> WaveDrift:
+def wave_drift(waves: Waves, particulars: Particulars) -> Curves:
     """Mean second-order forces in an irregular sea: 2 integral S(w) F(w) / a^2 dw.
 
     Surge by :func:`added_resistance`, sway and yaw by :func:`reflection_coefficients`;
@@ -68,15 +43,9 @@ def wave_drift(waves: Waves, particulars: Particulars) -> WaveDrift:
     sway = by_length * ship.length * pressure
     yaw = by_length_squared * ship.length**2 * pressure
 
-    variation = slow_drift(waves, ship)
-    return WaveDrift(
-        circle(),
-        X=over_directions(mirrored(surge), waves),
-        Y=over_directions(mirrored(sway, -1.0), waves),
-        N=over_directions(mirrored(yaw, -1.0), waves),
-        time_constant=variation.time_constant,
-        standard_deviation=variation.standard_deviation,
-    )
+    curves = [mirrored(surge), mirrored(sway, -1.0), mirrored(yaw, -1.0)]
+    no_heel = np.zeros(len(circle()))
+    return Curves(*(over_directions(curve, waves) for curve in curves), no_heel)
 
 
 def waterline(ship: Particulars) -> tuple[Floats, Floats]:

@@ -8,15 +8,18 @@ from numpy.typing import ArrayLike
 from shipgym.arrays import Floats
 
 
-class Harmonics(NamedTuple):
-    """Fourier coefficients of the forces on a ship with port-starboard symmetry."""
+class Curves(NamedTuple):
+    """Forces on a ship by an angle from the bow, or the Fourier series of these.
 
-    # shape (n + 1,); cosine series, the mean first: X = sum over k of X[k] cos(k angle)
+    The angle is where wind or waves come from, pi / 2 from starboard, which pushes to
+    port: Y < 0 there. Curves are over :func:`circle`; of a ship with port-starboard
+    symmetry X is a cosine series, the mean first, the others are sine series.
+    """
+
     X: Floats
-    # shape (n,); sine series: Y = sum over k of Y[k - 1] sin(k angle), k from 1
     Y: Floats
-    N: Floats
-    K: Floats
+    N: Floats  # about midship, positive to starboard
+    K: Floats  # about the waterline, positive to starboard
 
 
 def circle(points: int = 360) -> Floats:
@@ -40,14 +43,10 @@ def mirrored(half: ArrayLike, sign: float = 1.0) -> Floats:
     return np.concatenate([values, sign * other_side])
 
 
-def harmonics(X: Floats, Y: Floats, N: Floats, K: Floats, n: int) -> Harmonics:
-    """Fourier series of forces over :func:`circle`, up to the n-th harmonic."""
-    return Harmonics(
-        X=cosine_coefficients(X, n),
-        Y=sine_coefficients(Y, n),
-        N=sine_coefficients(N, n),
-        K=sine_coefficients(K, n),
-    )
+def harmonics(curves: Curves, n: int, scale: float = 1.0) -> Curves:
+    """Fourier series of forces, up to the n-th harmonic, times a scale."""
+    odd = [scale * sine_coefficients(curve, n) for curve in curves[1:]]
+    return Curves(scale * cosine_coefficients(curves.X, n), *odd)
 
 
 def cosine_coefficients(curve: Floats, n: int) -> Floats:

@@ -1,14 +1,12 @@
 """First-order heading in waves, and the slope of the waves that rolls a ship."""
 
-from dataclasses import dataclass
-
 from numpy import cos, exp, pi, sin, sinc, trapezoid
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 from shipgym.sea.conditions import Waves
 from shipgym.sea.estimates import weather_particulars
-from shipgym.sea.harmonics import circle, half_circle, mirrored
+from shipgym.sea.harmonics import half_circle, mirrored
 from shipgym.sea.waves import (
     frequencies,
     over_directions,
@@ -63,20 +61,10 @@ def effective_wave_slope(
     return k * across * attenuation
 
 
-@dataclass(frozen=True)
-class WaveMotion:
-    """Variance of wave-induced heading, and of the slope that rolls the ship."""
+def wave_motion(waves: Waves, particulars: Particulars) -> tuple[Floats, Floats]:
+    """Variance of wave-induced heading and of the slope that rolls the ship, rad2.
 
-    # shape (points,), 0 to below 2 pi; where waves come from, seen from the bow, pi / 2
-    # from starboard; rad
-    chi: Floats
-    # shape (points,), over the direction of the waves; rad2
-    heading_variance: Floats
-    slope_variance: Floats
-
-
-def wave_motion(waves: Waves, particulars: Particulars) -> WaveMotion:
-    """Variance of wave-induced heading and wave slope for waves from all directions.
+    Over the direction of the waves, :func:`shipgym.sea.harmonics.circle`.
 
     Particulars are estimated where absent, as in :func:`shipgym.sea.wave_drift`.
     """
@@ -89,8 +77,5 @@ def wave_motion(waves: Waves, particulars: Particulars) -> WaveMotion:
         in_long_crests = trapezoid(response**2 * spectrum, omega, axis=-1)
         return over_directions(mirrored(in_long_crests), waves)
 
-    return WaveMotion(
-        circle(),
-        heading_variance=variance(heading_response(omega, chi, ship)),
-        slope_variance=variance(effective_wave_slope(omega, chi, ship)),
-    )
+    heading = variance(heading_response(omega, chi, ship))
+    return heading, variance(effective_wave_slope(omega, chi, ship))

@@ -11,12 +11,12 @@ from shipgym.engine.records import flat
 from shipgym.sea.conditions import Current, Waves, Weather, Wind
 from shipgym.sea.drift import wave_drift
 from shipgym.sea.filters import Filter, GaussMarkov
-from shipgym.sea.harmonics import Harmonics, cosine_coefficients, harmonics
+from shipgym.sea.harmonics import Curves, cosine_coefficients, harmonics
 from shipgym.sea.mobility import mobility_matrix, roll_stiffness
 from shipgym.sea.motions import wave_motion
 from shipgym.sea.open_sea import SeaParameters
 from shipgym.sea.series import Cosines, Sines
-from shipgym.sea.waves import wave_filter
+from shipgym.sea.waves import slow_drift, wave_filter
 from shipgym.sea.wind import AIR_DENSITY, gust_filter, wind_curves
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 
@@ -66,9 +66,7 @@ def with_wind(
     """Parameters of a sea with a wind, and what it does to a ship."""
     mobility = mobility_matrix(model, water_depth)
     curves = wind_curves(model.particulars, wind.coefficients)
-    series = harmonics(curves.X, curves.Y, curves.N, curves.K, HARMONICS)
-    forces = Harmonics(*(0.5 * AIR_DENSITY * row for row in series))
-    by_wind = _accelerations(mobility, forces)
+    by_wind = _accelerations(mobility, harmonics(curves, HARMONICS, 0.5 * AIR_DENSITY))
     of_her_own_wind = float(by_wind.X.sum())  # at angle 0
     return sea._replace(
         wind_speed=wind.speed,
@@ -93,26 +91,21 @@ def with_waves(
     mobility = mobility_matrix(model, water_depth)
     spectrum = wave_filter(waves)
     drift = wave_drift(waves, model.particulars)
-    slow_drift = GaussMarkov(drift.time_constant, drift.standard_deviation)
-    motion = wave_motion(waves, model.particulars)
-    no_heel = np.zeros(len(drift.chi))
-    forces = harmonics(drift.X, drift.Y, drift.N, no_heel, HARMONICS)
-    by_waves = _accelerations(mobility, forces)
+    heading, slope = wave_motion(waves, model.particulars)
+    by_waves = _accelerations(mobility, harmonics(drift, HARMONICS))
     return sea._replace(
         waves_from=_radians(waves.from_deg),
         wave_frequency=spectrum.peak_frequency,
         wave_number=spectrum.peak_frequency**2 / GRAVITY,
         wave_damping=spectrum.damping,
         wave_ringing=float(np.sqrt(1.0 - spectrum.damping**2)),
-        drift=discrete(slow_drift, step),
+        drift=discrete(slow_drift(waves, model.particulars), step),
         drift_surge=Cosines(*by_waves.X),
         drift_sway=Sines(*by_waves.Y),
         drift_yaw=Sines(*by_waves.N),
         drift_roll=Sines(*by_waves.K),
-        heading_variance=_variances(motion.heading_variance),
-        roll_variance=_variances(
-            (roll_stiffness(model) * mobility[3, 3]) ** 2 * motion.slope_variance
-        ),
+        heading_variance=_variances(heading),
+        roll_variance=_variances((roll_stiffness(model) * mobility[3, 3]) ** 2 * slope),
     )
 
 
@@ -141,8 +134,8 @@ def _radians(degrees: float | None) -> float:
     return float("nan") if degrees is None else float(np.radians(degrees))
 
 
-def _accelerations(mobility: Floats, forces: Harmonics) -> Harmonics:
+def _accelerations(mobility: Floats, forces: Curves) -> Curves:
     """Series of accelerations in surge, sway, yaw and roll by those of forces."""
     lateral = mobility[1:, 1:] @ np.stack([forces.Y, forces.N, forces.K])
     sway, yaw, roll = lateral
-    return Harmonics(mobility[0, 0] * forces.X, sway, yaw, roll)
+    return Curves(mobility[0, 0] * forces.X, sway, yaw, roll)

@@ -1,15 +1,13 @@
 """Wind forces on a ship over the direction of the relative wind, and gusts."""
 
-from dataclasses import dataclass
 from math import gamma, pi, sqrt
 
 import numpy as np
 
-from shipgym.arrays import Floats
 from shipgym.sea.conditions import Wind
 from shipgym.sea.estimates import weather_particulars
 from shipgym.sea.filters import GaussMarkov
-from shipgym.sea.harmonics import circle
+from shipgym.sea.harmonics import Curves, circle
 from shipgym.sea.wind_coefficients import (
     BLENDERMANN,
     blendermann_coefficients,
@@ -28,32 +26,12 @@ HARRIS_VARIANCE = 2.0 ** (2.0 / 3.0) * (
 AIR_DENSITY = 1.225
 
 
-@dataclass(frozen=True)
-class WindCurves:
-    """Wind forces and moments by dynamic pressure, 0.5 air density relative speed^2.
+def wind_curves(particulars: Particulars, coefficients: str = "blendermann") -> Curves:
+    """Wind forces of a ship by dynamic pressure, 0.5 air density relative speed^2.
 
-    The angle is that of the relative wind seen from the bow, 0 ahead, pi / 2 from
-    starboard: where (u_rw, v_rw) is the ship's velocity through the air in body axes
-    and V its length, cos(angle) = u_rw / V and sin(angle) = v_rw / V. Wind from
-    starboard pushes to port: Y < 0 there.
-    """
-
-    angle: Floats  # shape (points,); from 0 to below 2 pi, rad
-    # shape (points,); surge and sway force by dynamic pressure, m2
-    X: Floats
-    Y: Floats
-    # shape (points,); yaw moment about midship by dynamic pressure, positive to
-    # starboard, m3
-    N: Floats
-    # shape (points,); heeling moment about the waterline by dynamic pressure, positive
-    # to starboard, m3
-    K: Floats
-
-
-def wind_curves(
-    particulars: Particulars, coefficients: str = "blendermann"
-) -> WindCurves:
-    """Wind forces of a ship over all directions; coefficients as in `Wind`.
+    Over all directions of the relative wind: where (u_rw, v_rw) is the ship's velocity
+    through the air in body axes and V its length, cos(angle) = u_rw / V and sin(angle)
+    = v_rw / V. X and Y in m2, N and K in m3; coefficients as in `Wind`.
 
     Areas, centroid and length overall are estimated where not given
     (`weather_particulars`). Raises InputError for unknown coefficients, or particulars
@@ -72,19 +50,11 @@ def wind_curves(
     to_lee = np.where(from_starboard, -1.0, 1.0)
 
     type_of_ship = blendermann_type(coefficients, ship.require("block_coefficient"))
-    c = blendermann_coefficients(
-        BLENDERMANN[type_of_ship],
-        folded,
-        area_ratio=frontal / lateral,
-        centroid_ratio=ship.require("lateral_centroid") / length,
-    )
-    return WindCurves(
-        angle,
-        X=frontal * c.CX,
-        Y=to_lee * lateral * c.CY,
-        N=to_lee * lateral * length * c.CN,
-        K=to_lee * lateral * height * c.CK,
-    )
+    row = BLENDERMANN[type_of_ship]
+    CX, CY = blendermann_coefficients(row, folded, area_ratio=frontal / lateral)
+    sway = to_lee * lateral * CY
+    lever = ship.require("lateral_centroid") - 0.18 * length * (folded - 0.5 * pi)
+    return Curves(frontal * CX, sway, sway * lever, sway * row.kappa * height)
 
 
 def gust_filter(wind: Wind) -> GaussMarkov:

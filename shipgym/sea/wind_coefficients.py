@@ -20,18 +20,6 @@ class Blendermann(NamedTuple):
     kappa: float  # rolling-moment factor
 
 
-class WindCoefficients(NamedTuple):
-    """Coefficients at some angles of the relative wind, arrays of one shape."""
-
-    CX: Floats  # surge force by frontal area
-    CY: Floats  # sway force to lee by lateral area
-    # yaw moment about midship, bow to lee, by lateral area and length overall
-    CN: Floats
-    # heeling moment about the waterline, to lee, by lateral area and the height of its
-    # centroid
-    CK: Floats
-
-
 _TABLES = shipped_toml("shipgym.sea", "wind.toml")
 #: By type of ship.
 BLENDERMANN = {ship: Blendermann(*row) for ship, row in _TABLES["blendermann"].items()}
@@ -65,26 +53,17 @@ def blendermann_type(name: str, block_coefficient: float) -> str:
 
 
 def blendermann_coefficients(
-    row: Blendermann, angle: Floats, area_ratio: float, centroid_ratio: float
-) -> WindCoefficients:
-    """Blendermann's coefficients of a type of ship for wind of one side.
+    row: Blendermann, angle: Floats, area_ratio: float
+) -> tuple[Floats, Floats]:
+    """Coefficients of surge, by frontal area, and of sway to lee, by lateral area.
 
-    Fossen 2021, section 10.1.2. `angle` is from 0 (ahead) to pi
-    (astern), `area_ratio` the frontal by the lateral area, `centroid_ratio` the
-    centroid of the lateral area forward of midship by length overall. CK is by lateral
-    area and the height of its centroid.
+    Fossen 2021, section 10.1.2. `angle` is from 0 (ahead) to pi (astern), `area_ratio`
+    the frontal by the lateral area.
     """
     CD_l_AF = where(angle <= pi / 2, row.CD_l_bow, row.CD_l_stern)
     CD_l = CD_l_AF * area_ratio
     cross_force = 0.5 * row.delta * (1.0 - CD_l / row.CD_t)
     oblique = sin(2.0 * angle) ** 2
     denominator = 1.0 - cross_force * oblique
-
-    CY = row.CD_t * sin(angle) / denominator
-    lever = centroid_ratio - 0.18 * (angle - pi / 2)
-    return WindCoefficients(
-        CX=-CD_l_AF * cos(angle) / denominator,
-        CY=CY,
-        CN=lever * CY,
-        CK=row.kappa * CY,
-    )
+    surge = -CD_l_AF * cos(angle) / denominator
+    return surge, row.CD_t * sin(angle) / denominator

@@ -95,7 +95,7 @@ def test_waves_push_to_lee_and_turn_the_ship_beam_on(ship):
     assert drift.Y[[bow, beam, quarter]].max() < 0.0
     assert drift.N[bow] < 0.0 < drift.N[quarter]
     assert drift.X[[0, bow]].max() < 0.0
-    mirror = -np.arange(len(drift.chi))
+    mirror = -np.arange(len(drift.X))
     np.testing.assert_allclose(
         drift.X, drift.X[mirror], rtol=1e-9, atol=1e-9 * abs(drift.X[0])
     )
@@ -197,10 +197,8 @@ def test_drift_and_motion_are_finite_for_any_ship_in_any_sea(
         drift.X,
         drift.Y,
         drift.N,
-        motion.heading_variance,
-        motion.slope_variance,
+        *motion,
     ):
         assert np.isfinite(curve).all()
-    assert drift.time_constant > 0.0
-    for variance in (motion.heading_variance, motion.slope_variance):
+    for variance in motion:
         assert variance.min() >= -1e-9 * variance.max()

@@ -17,6 +17,7 @@ from shipgym.sea import (
     wave_motion,
     wind_curves,
 )
+from shipgym.sea.harmonics import circle
 from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.wind import gust_filter
 from shipgym.tasks import course_keeping_task
@@ -95,7 +96,7 @@ def test_the_first_push_of_the_wind_is_its_force_by_the_inertia(mariner, from_de
     curves = wind_curves(mariner.particulars)
     pressure = 0.5 * AIR_DENSITY * speed**2
     forces = [
-        pressure * np.interp(np.radians(from_deg % 360.0), curves.angle, curve)
+        pressure * np.interp(np.radians(from_deg % 360.0), circle(), curve)
         for curve in (curves.X, curves.Y, curves.N, curves.K)
     ]
     expected = mobility_matrix(mariner) @ forces
@@ -133,8 +134,7 @@ def test_heading_in_waves_has_the_variance_and_the_rhythm_of_the_filter(mariner,
     model, state = inert(mariner, mariner.particulars["speed"])
     trial = ahead(model, Weather(waves=waves), steps, dt, state=state)
     assert np.ptp(trial["psi"]) < 0.01
-    motion = wave_motion(waves, model.particulars)
-    variance = motion.heading_variance[np.argmin(np.abs(motion.chi - np.radians(60.0)))]
+    variance = wave_motion(waves, model.particulars)[0][60]
     w0 = 2.0 * np.pi / 9.7
     w = w0 + w0**2 / 9.80665 * model.particulars["speed"] * np.cos(np.radians(60.0))
     damping = 0.1056

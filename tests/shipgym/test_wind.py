@@ -27,7 +27,7 @@ KVLCC2 = load_model("kvlcc2").particulars
 
 def at(curves, degrees):
     """X, Y, N and K where the wind comes from there."""
-    i = round(degrees * len(curves.angle) / 360)
+    i = round(degrees * len(curves.X) / 360)
     return curves.X[i], curves.Y[i], curves.N[i], curves.K[i]
 
 
@@ -43,7 +43,7 @@ def test_blendermann_at_30_degrees_worked_by_hand():
 @pytest.mark.parametrize("coefficients", coefficient_names())
 def test_wind_pushes_to_lee_and_its_mirror_image_the_other_way(coefficients):
     curves = wind_curves(S175, coefficients)
-    mirror = -np.arange(len(curves.angle))
+    mirror = -np.arange(len(curves.X))
     np.testing.assert_allclose(curves.X, curves.X[mirror], atol=1e-9)
     for odd in (curves.Y, curves.N, curves.K):
         np.testing.assert_allclose(odd, -odd[mirror], atol=1e-6)
