@@ -34,7 +34,7 @@ class Loop:
 MEASURED_GEAR = {"HAS_LAG": False}
 LOOPS = {
     "derivatives": Loop(
-        trajectories.derivatives, f"void({TABLE}, {TABLE}, {VECTOR}, {VECTOR}, {TABLE})"
+        trajectories.derivatives, f"void({TABLE}, {TABLE}, {VECTOR}, {TABLE})"
     ),
     "sample_sea": Loop(trajectories.sample_sea, f"void({TABLE}, {SEA})"),
     "simulate": Loop(

@@ -52,7 +52,6 @@ SEA_CHANNELS = SeaChannels._fields
 
 #: (ship, rudder_limit, rudder_rate, gear_frequency)
 with_gear = changer(Ship, "rudder_limit", "rudder_rate", "gear_frequency")
-in_depth = changer(Ship, "water_depth")
 replaced = changer(Motion, "psi", "delta", "n")
 
 
@@ -113,7 +112,6 @@ def record_sea(out: Any, row: int, sea: Any, parameters: Any) -> None:
 def derivatives(
     states: Any,
     commands: Any,
-    depths: Any,
     numbers: Any,
     out: Any,
 ) -> None:
@@ -128,7 +126,7 @@ def derivatives(
         motion = replaced(motion, motion.psi, motion.delta, n)
 
         held = Held(order, shaft, CALM)
-        k = rates(motion, held, coefficients, in_depth(ship, depths[i]))
+        k = rates(motion, held, coefficients, ship)
         ahead, aside = ground_velocity(motion, 0.0, 0.0)
         sine, cosine = sin_cos(motion.psi)
         derivative = Motion(

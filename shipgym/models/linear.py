@@ -163,61 +163,38 @@ def linearise(model: ShipModel, at: StraightRunning) -> tuple[Floats, Floats]:
     yaw, whose ship does not drift, q stands in place of v.
     """
     sway = "q" if "q" in model.state_names else "v"
-    states = [sway, "r"]
-    inputs = [*states, "delta"]
-    roll: list[str] = [name for name in ("p", "phi") if name in model.state_names]
-    jacobian = _jacobian(model, at, [*states, *roll])
-    steering = _block(jacobian, states, inputs)
+    roll = [name for name in ("p", "phi") if name in model.state_names]
+    jacobian = _jacobian(model, at, [sway, "r", *roll])
+    by_inputs = jacobian[:, [0, 1, -1]]  # sway, yaw rate, rudder
+    steering = by_inputs[:2]
     if roll:
         # roll is balanced, 0 = R_s s + R_p p, s = (v, r, delta): p = -R_p^-1 R_s s
-        R_s = _block(jacobian, roll, inputs)
-        R_p = _block(jacobian, roll, roll)
-        by_roll = _block(jacobian, states, roll)
-        roll_by_inputs = np.linalg.solve(R_p, R_s)
-        steering -= by_roll @ roll_by_inputs
+        by_roll = jacobian[:, 2:-1]
+        steering = steering - by_roll[:2] @ np.linalg.solve(by_roll[2:], by_inputs[2:])
 
     prime_units = _units(model)
-    units = np.array([prime_units[name] for name in states])
+    units = np.array([prime_units[name] for name in (sway, "r")])
     rates = steering * units[:, None] / model.travel_time
     A = rates[:, :2] / units
     B = rates[:, 2:]
     return A, B
 
 
-def _jacobian(
-    model: ShipModel, at: StraightRunning, rates: list[str]
-) -> dict[tuple[str, str], float]:
-    """Derivatives of rates by states and rudder, prime system, by the names of both."""
+def _jacobian(model: ShipModel, at: StraightRunning, names: list[str]) -> Floats:
+    """Derivatives of the rates of states by these and the rudder, prime system.
+
+    A row a rate.
+    """
     step = 1e-4  # prime system; the error of central differences is its square
     units = _units(model)
     state = dict.fromkeys(model.state_names, 0.0) | at.named
-
-    def rates_off(name: str, step: float) -> dict[str, float]:
-        off = dict(state)
-        off[name] += step * units[name]
-        found = _prime_rates(model, off)
-        if "p" in found:
-            found["phi"] = off["p"] / units["p"]
-        return found
-
-    jacobian = {}
-    for name in (*rates, "delta"):
-        ahead = rates_off(name, step)
-        behind = rates_off(name, -step)
-        for rate in rates:
-            jacobian[rate, name] = (ahead[rate] - behind[rate]) / (2.0 * step)
-    return jacobian
-
-
-def _block(
-    jacobian: dict[tuple[str, str], float], rates: list[str], by: list[str]
-) -> Floats:
-    """Entries of a Jacobian as a matrix, a row a rate."""
-    matrix = np.empty((len(rates), len(by)))
-    for row, rate in enumerate(rates):
-        for column, name in enumerate(by):
-            matrix[row, column] = jacobian[rate, name]
-    return matrix
+    columns = []
+    for name in (*names, "delta"):
+        off = step * units[name]
+        ahead = _prime_rates(model, state | {name: state[name] + off})
+        behind = _prime_rates(model, state | {name: state[name] - off})
+        columns.append([(ahead[rate] - behind[rate]) / (2.0 * step) for rate in names])
+    return np.array(columns).T
 
 
 def steering_state_space(model: ShipModel) -> tuple[Floats, Floats]:

@@ -206,8 +206,6 @@ class ManoeuvringModel:
         """
         from shipgym.engine.loops import ship_loop  # a linear design does without
 
-        depth = np.asarray(water_depth, dtype=float)
-        self.check_depth(float(depth.min()))
         states = _with_last_axis("state", state, self.state_names)
         commands = _with_last_axis("command", command, self.command_names)
         wrong = states[~np.isfinite(states)]
@@ -215,25 +213,13 @@ class ManoeuvringModel:
             raise InputError(f"state: expected finite numbers, got {wrong[0]}")
 
         # one row for each state
-        shape = np.broadcast_shapes(
-            states.shape[:-1],
-            commands.shape[:-1],
-            depth.shape,
-        )
+        shape = np.broadcast_shapes(states.shape[:-1], commands.shape[:-1])
         rows = _rows(states, shape)
         orders = _rows(commands, shape)
         check_units(self, orders, "command")
-        depths = np.array(np.broadcast_to(depth, shape)).ravel()
-
         rates = np.empty_like(rows)
         loop = ship_loop(self.compiled, "derivatives")
-        loop(
-            rows,
-            two_commands(orders),
-            depths,
-            self.ship_numbers(),
-            rates,
-        )
+        loop(rows, two_commands(orders), self.ship_numbers(water_depth), rates)
         return rates.reshape(*shape, len(self.state_names))
 
     def rates(
@@ -264,7 +250,7 @@ class ManoeuvringModel:
         rates = np.full_like(row, np.nan)
         loop = plain_loop(self.compiled, "derivatives")
         with np.errstate(all="ignore"), suppress(ArithmeticError, ValueError):
-            loop(row, orders, np.array([np.inf]), self.ship_numbers(), rates)
+            loop(row, orders, self.ship_numbers(), rates)
         return dict(zip(self.state_names, rates[0].tolist(), strict=True))
 
     # ---- model file ------------------------------------------------------------------

@@ -4,6 +4,15 @@ The vectorial model of captive tests: Xu, Hassani & Guedes Soares 2020, Truncate
 square support vector machine for parameter estimation of a nonlinear manoeuvring model
 based on PMM tests, equations 18 to 21 and 39 to 41. Its hydrodynamic forces hold
 accelerations, so that the mass to be accelerated follows from the coefficients.
+
+How the damaged print is read: equation 19 prints Y_vdot vdot + Y_rdot rdot in X;
+equations 25 and 26 have v r and r r in their place, as the matrix of equation 16 has,
+so here, with the sign that is printed. Kirchhoff's equations have the other one; X_rvu
+and X_urr take up the difference. Two terms of equations 20 and 21 are printed as Y_rvv
+and Y_vvr; Table 1's units make the first v r r. Equations 40 and 41 print Y_uvv and
+Y_urr on u u v and u u r: Y_uuv and Y_uur (equations 28 and 30); so N's. In N of
+equation 41 and Table 11 the value -1.69e-2 is printed on v |v|, -1.00e-3 on r |v|;
+equation 38, the matrix of equation 42 and Table 2 have v |r|, and equation 41 r |r|.
 """
 
 from collections.abc import Iterable, Mapping
