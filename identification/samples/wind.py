@@ -48,7 +48,7 @@ def measured_wind(
         curves,
         bool(table.get("relative", False)),
     )
-    inertia = particulars_inertia(particulars.completed())[:, :3]
+    inertia = particulars_inertia(particulars.completed())[:3, :3]
     accelerations = np.linalg.solve(inertia, forces)
     return trial.with_channels(dict(zip(WIND.values(), accelerations, strict=True)))
 

@@ -55,7 +55,7 @@ def oscillate(
     beyond = np.zeros((len(t), 4))
     for column, axis in enumerate("uvr"):
         beyond[:, column] = rates[axis] - acceleration[:, column]
-    forces = inertia(model) @ beyond.T
+    forces = inertia(model)[:3] @ beyond.T
     channels |= zip("XYN", forces, strict=True)
     return Trial(t, channels, kind="captive", length=model.particulars["length"])
 

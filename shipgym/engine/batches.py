@@ -5,15 +5,13 @@ from typing import Any
 
 from shipgym.engine.hooks import (
     load_coefficients,
-    load_inputs,
     load_motion,
     load_ship,
     store_motion,
 )
-from shipgym.engine.lane_records import WindAccelerations
-from shipgym.engine.motion import Push, sail
+from shipgym.engine.motion import sail
 from shipgym.engine.records import LANES
-from shipgym.engine.trajectories import NO_LIMIT, replaced, with_gear
+from shipgym.engine.trajectories import NO_LIMIT, push_of_wind, replaced, with_gear
 
 
 def sail_segment(
@@ -35,14 +33,11 @@ def sail_segment(
     the state at a point, -1 for none. A ship that runs away leaves numbers that are not
     finite, or not any ship's.
     """
-    begin = inputs[0]
-    set_rudders(state, offsets, load_inputs(begin).rudder)
+    set_rudders(state, offsets, inputs[0, 1])
     keep_sample(state, samples[0], out)
     for i in range(1, len(inputs)):
-        end = inputs[i]
-        sail_between(state, ships, offsets, begin, end)
+        sail_between(state, ships, offsets, inputs[i - 1], inputs[i])
         keep_sample(state, samples[i], out)
-        begin = end
 
 
 def set_rudders(state: Any, offsets: Any, rudder: float) -> None:
@@ -56,33 +51,24 @@ def set_rudders(state: Any, offsets: Any, rudder: float) -> None:
 
 def sail_between(state: Any, ships: Any, offsets: Any, begin: Any, end: Any) -> None:
     """Move a tile of ships from one point of the inputs to the next."""
-    first = load_inputs(begin)
-    last = load_inputs(end)
-    h = last.time - first.time
-    rate = fabs(last.rudder - first.rudder) / h
-    shaft = 0.5 * (first.shaft + last.shaft)
-    wind = mean_push(first.wind, last.wind)
+    time, measured, shaft, surge, sway, yaw = range(6)  # columns
+    h = end[time] - begin[time]
+    rate = fabs(end[measured] - begin[measured]) / h
+    n = 0.5 * (begin[shaft] + end[shaft])
+    wind = push_of_wind(
+        0.5 * (begin[surge] + end[surge]),
+        0.5 * (begin[sway] + end[sway]),
+        0.5 * (begin[yaw] + end[yaw]),
+    )
     for lane in range(LANES):
         own = load_ship(ships, lane)
         ship = with_gear(own, NO_LIMIT, rate, 0.0)
         coefficients = load_coefficients(ships, lane)
-        rudder = last.rudder + offsets[lane]
+        rudder = end[measured] + offsets[lane]
         motion = load_motion(state, lane)
-        motion = sail(motion, rudder, shaft, h, wind, coefficients, ship)
+        motion = sail(motion, rudder, n, h, wind, coefficients, ship)
         motion = replaced(motion, motion.psi, rudder, motion.n)
         store_motion(state, lane, motion)
-
-
-def mean_push(first: WindAccelerations, last: WindAccelerations) -> Push:
-    """Mean of the accelerations by wind at two points."""
-    return Push(
-        u=0.5 * (first.surge + last.surge),
-        v=0.5 * (first.sway + last.sway),
-        r=0.5 * (first.yaw + last.yaw),
-        p=0.0,
-        north=0.0,
-        east=0.0,
-    )
 
 
 def keep_sample(state: Any, row: int, out: Any) -> None:

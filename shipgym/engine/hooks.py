@@ -56,8 +56,6 @@ load_sensor_settings = given  # `Settings` of the sensor set
 load_task_settings = given  # `Settings` of the task in a lane
 load_arguments = given  # `Arguments`
 store_sea_channels = given  # `SeaChannels`, behind the state of a row
-load_wind = given  # `WindAccelerations`
-load_inputs = given  # `Inputs`
 
 # between the stages of a step (`shipgym.engine.stages`), with the results
 load_point = store_point = given  # `Point`

@@ -72,23 +72,6 @@ class Sums(NamedTuple):
     r: float
 
 
-class WindAccelerations(NamedTuple):
-    """Accelerations by measured wind, m/s^2 and rad/s^2."""
-
-    surge: float
-    sway: float
-    yaw: float
-
-
-class Inputs(NamedTuple):
-    """Point of a measured trial, whose inputs are linear between points."""
-
-    time: float  # s
-    rudder: float  # rad
-    shaft: float  # 1/s
-    wind: WindAccelerations
-
-
 class SeaChannels(NamedTuple):
     """Channels of the sea that are recorded in addition to the state."""
 

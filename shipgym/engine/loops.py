@@ -8,9 +8,9 @@ from typing import Any
 from shipgym.engine import batches, steered, trajectories
 from shipgym.engine.compiled_ship import STILL_WATER, CompiledSea, CompiledShip
 from shipgym.engine.compiling import compiled, plain
-from shipgym.engine.lane_records import Inputs, SeaChannels, WindAccelerations
-from shipgym.engine.record_code import loader, storer
-from shipgym.engine.records import LANES, Layout, Rows
+from shipgym.engine.lane_records import SeaChannels
+from shipgym.engine.record_code import storer
+from shipgym.engine.records import LANES, Rows
 from shipgym.engine.trajectories import SEA_CHANNELS
 
 VECTOR = "float64[::1]"
@@ -65,8 +65,12 @@ def ship_loop(ship: CompiledShip, name: str, sea: CompiledSea = STILL_WATER) -> 
     """Compile a loop of `LOOPS` for a ship, by default in still water."""
     loop = LOOPS[name]
     where = "in the open sea" if sea.windy else "in calm water"
-    what = f"{ship.name} {where}: {name}"
-    return compiled(loop.function, loop.signature, _hooks(ship, loop, sea), what)
+    return compiled(
+        loop.function,
+        loop.signature,
+        _hooks(ship, loop, sea),
+        what=f"{ship.name} {where}: {name}",
+    )
 
 
 @cache
@@ -83,7 +87,5 @@ def _hooks(ship: CompiledShip, loop: Loop, sea: CompiledSea) -> dict[str, Any]:
         **ship.hooks(loop.lanes, loop.shared),
         **sea.hooks(loop.lanes),
         "store_sea_channels": storer(channels, 1),
-        "load_inputs": loader(Layout(inputs=Inputs)["inputs"], 1),
-        "load_wind": loader(Layout(wind=WindAccelerations)["wind"], 1),
         **loop.hooks,
     }

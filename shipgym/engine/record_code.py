@@ -150,11 +150,10 @@ def fieldwise(record: type[R], arguments: str, value: str) -> Callable[..., R]:
     `fieldwise(Fix, "a, b", "a.{0} + b.{0}")` is the sum of two: `{0}` is the field.
     """
     known: Any = record
-    made = ", ".join(value.format(field) for field in known._fields)
+    made = [value.format(field) for field in known._fields]
     name = record.__name__
-    return written(
-        f"made_{name}", arguments, [f"return {name}({made})"], {name: record}
-    )
+    body = [f"return {name}({', '.join(made)})"]
+    return written(f"made_{name}", arguments, body, {name: record})
 
 
 def _part(record: str, path: str) -> str:

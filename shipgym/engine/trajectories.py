@@ -19,13 +19,12 @@ from shipgym.engine.hooks import (
     load_sea,
     load_sea_parameters,
     load_ship,
-    load_wind,
     push,
     store_motion,
     store_sea,
     store_sea_channels,
 )
-from shipgym.engine.lane_records import SeaChannels, WindAccelerations
+from shipgym.engine.lane_records import SeaChannels
 from shipgym.engine.mathematics import clip, sin_cos
 from shipgym.engine.motion import (
     CALM,
@@ -169,16 +168,9 @@ def simulate(
     return len(commands)
 
 
-def push_of_wind(wind: WindAccelerations) -> Push:
-    """Accelerations by wind in still water."""
-    return Push(
-        u=wind.surge,
-        v=wind.sway,
-        r=wind.yaw,
-        p=0.0,
-        north=0.0,
-        east=0.0,
-    )
+def push_of_wind(surge: float, sway: float, yaw: float) -> Push:
+    """Accelerations by measured wind in still water."""
+    return Push(surge, sway, yaw, 0.0, 0.0, 0.0)
 
 
 def open_loop(
@@ -208,7 +200,7 @@ def open_loop(
         h = interval / steps
         rate = fabs(rudder - delta[i]) / interval
         ship = with_gear(own, NO_LIMIT, rate, 0.0)
-        pushed = push_of_wind(load_wind(wind[i]))
+        pushed = push_of_wind(wind[i, 0], wind[i, 1], wind[i, 2])
 
         for k in range(steps):
             shaft = n[i] + change * (k + 0.5) / steps

@@ -83,10 +83,8 @@ def read_model(
     )
     check_keys(fields, (*required, *OPTIONAL), where, required)
     dynamics = _read_dynamics(fields["structure"], f"{where}: structure", make)
-    own_unit = dynamics.normalisation
-    unit = fields.get("normalisation", own_unit)
-    if unit != own_unit:
-        raise unexpected(f"{where}: normalisation", repr(own_unit), unit)
+    unit = dynamics.normalisation
+    check_choice(fields.get("normalisation", unit), (unit,), f"{where}: normalisation")
     covariance = fields.get("covariance")
     if covariance is not None:
         n = len(dynamics.coefficient_names)

@@ -109,7 +109,8 @@ def _random_word(seed: Seed) -> NDArray[np.uint64]:
     """State of a loop's random numbers, by a seed, shape (1,)."""
     if not isinstance(seed, np.random.Generator):
         check_whole(seed, "seed", at_least=0)
-    word = np.random.default_rng(seed).integers(2**63)
+    rng = np.random.default_rng(seed)
+    word = rng.integers(2**63)
     return np.array([word], dtype=np.uint64)
 
 

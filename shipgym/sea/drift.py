@@ -43,9 +43,12 @@ def wave_drift(waves: Waves, particulars: Particulars) -> Curves:
     sway = by_length * ship.length * pressure
     yaw = by_length_squared * ship.length**2 * pressure
 
-    curves = [mirrored(surge), mirrored(sway, -1.0), mirrored(yaw, -1.0)]
-    no_heel = np.zeros(len(circle()))
-    return Curves(*(over_directions(curve, waves) for curve in curves), no_heel)
+    return Curves(
+        X=over_directions(mirrored(surge), waves),
+        Y=over_directions(mirrored(sway, -1.0), waves),
+        N=over_directions(mirrored(yaw, -1.0), waves),
+        K=np.zeros(len(circle())),
+    )
 
 
 def waterline(ship: Particulars) -> tuple[Floats, Floats]:

@@ -26,14 +26,11 @@ def mobility_matrix(model: ManoeuvringModel, water_depth: float = np.inf) -> Flo
     that names what mass and added mass lack.
     """
     axes = _axes(model)
-    mass = np.zeros((4, 4))
     try:
-        mass[:3] = inertia(model, water_depth)
+        mass = inertia(model, water_depth)
     except InputError as error:
         raise InputError(f"weather without the particulars it needs: {error}") from None
-    if model.structure == "container":
-        mass[3] = _container_roll(model, mass)
-    elif 3 in axes:
+    if 3 in axes and mass[3, 3] == 0.0:
         mass[3, 3] = roll_inertia(model)
 
     matrix = np.zeros((4, 4))
@@ -62,15 +59,3 @@ def roll_inertia(model: ManoeuvringModel) -> float:
     """Inertia in roll with that of the water, m g GM (T / 2 pi)^2, kg m2."""
     ship = weather_particulars(model.particulars)
     return roll_stiffness(model) * (ship.require("roll_period") / (2.0 * np.pi)) ** 2
-
-
-def _container_roll(model: ManoeuvringModel, mass: Floats) -> Floats:
-    """Row of roll in Son & Nomoto's equations, whose inertia is symmetric."""
-    c = model.coefficients
-    p = model.particulars
-    unit = 0.5 * p.require("water_density") * p.length**5
-    prime = c["Ix"] + c["Jx"]
-    row = np.zeros(4)
-    row[1] = mass[1, 3]
-    row[3] = prime * unit
-    return row

@@ -120,18 +120,6 @@ def over_directions(curve: Floats, waves: Waves) -> Floats:
     return irfft(convolution, n=n)
 
 
-def encounter_frequency(omega: ArrayLike, speed: ArrayLike, chi: ArrayLike) -> Floats:
-    """Frequency of encounter in deep water: |omega + omega^2 U cos(chi) / g|, rad/s.
-
-    `omega` is of the waves, rad/s, `speed` the ship's, m/s; `chi`, rad, is where the
-    waves come from, seen from the bow: 0 ahead, pi / 2 from starboard.
-    """
-    w = np.asarray(omega, dtype=float)
-    U = np.asarray(speed, dtype=float)
-    met: Floats = abs(w + wave_number(w) * U * cos(chi))
-    return met
-
-
 def wave_filter(waves: Waves) -> WaveFilter:
     """Second-order filter with the shape of the wave spectrum and unit variance.
 

@@ -53,8 +53,14 @@ def wind_curves(particulars: Particulars, coefficients: str = "blendermann") -> 
     row = BLENDERMANN[type_of_ship]
     CX, CY = blendermann_coefficients(row, folded, area_ratio=frontal / lateral)
     sway = to_lee * lateral * CY
-    lever = ship.require("lateral_centroid") - 0.18 * length * (folded - 0.5 * pi)
-    return Curves(frontal * CX, sway, sway * lever, sway * row.kappa * height)
+    from_abeam = folded - 0.5 * pi
+    lever = ship.require("lateral_centroid") - 0.18 * length * from_abeam
+    return Curves(
+        X=frontal * CX,
+        Y=sway,
+        N=lever * sway,
+        K=row.kappa * height * sway,
+    )
 
 
 def gust_filter(wind: Wind) -> GaussMarkov:

@@ -65,5 +65,6 @@ def blendermann_coefficients(
     cross_force = 0.5 * row.delta * (1.0 - CD_l / row.CD_t)
     oblique = sin(2.0 * angle) ** 2
     denominator = 1.0 - cross_force * oblique
-    surge = -CD_l_AF * cos(angle) / denominator
-    return surge, row.CD_t * sin(angle) / denominator
+    surge = -CD_l_AF * cos(angle)
+    sway = row.CD_t * sin(angle)
+    return surge / denominator, sway / denominator

@@ -9,12 +9,13 @@ from shipgym.ships.term_table import Structure
 
 
 def inertia(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
-    """Mass and added mass by which a model divides its forces, shape (3, 4), SI units.
+    """Mass and added mass by which a model divides its forces, shape (4, 4), SI units.
 
-    From the accelerations in surge, sway, yaw and roll to surge force, sway force and
-    yaw moment about midship. A reference ship has them in its own numbers (the tanker's
-    grow in shallow water, depth in m), an identified structure in its particulars,
-    estimated where absent. Raises InputError if these do not tell the mass.
+    From the accelerations in surge, sway, yaw and roll to surge force, sway force, yaw
+    moment about midship and roll moment, which only the container ship has. A
+    reference ship has them in its own numbers (the tanker's grow in shallow water,
+    depth in m), an identified structure in its particulars, estimated where absent.
+    Raises InputError if these do not tell the mass.
     """
     if model.structure == "container":
         return _container(model)
@@ -43,7 +44,7 @@ def particulars_inertia(p: Particulars) -> Floats:
 def _with_arms(prime: Floats, p: Particulars) -> Floats:
     """Matrix of the prime system by its ship lengths, and nothing in roll."""
     arms = np.array([1.0, 1.0, p.length])
-    return np.hstack([prime * arms * arms[:, None], np.zeros((3, 1))])
+    return np.pad(prime * arms * arms[:, None], (0, 1))
 
 
 def _container(model: ManoeuvringModel) -> Floats:
@@ -51,7 +52,9 @@ def _container(model: ManoeuvringModel) -> Floats:
     c = model.coefficients
     p = model.particulars.completed()
     mass = particulars_inertia(p)
-    mass[1, 3] = -c["my"] * c["ly"] * p.length * _mass_unit(p)
+    unit = _mass_unit(p)
+    mass[1, 3] = mass[3, 1] = -c["my"] * c["ly"] * p.length * unit
+    mass[3, 3] = (c["Ix"] + c["Jx"]) * p.length**2 * unit
     return mass
 
 
@@ -60,9 +63,15 @@ def _mmg(model: ManoeuvringModel) -> Floats:
     c = model.coefficients
     p = model.particulars.completed()
     slender = p.require("draught") / p.length
-    added = -slender * np.diag([c["mx"], c["my"], c["Jz"]])
+    added = [
+        c["mx"],
+        c["my"],
+        c["Jz"],
+    ]
+    derivatives = -slender * np.diag(added)
     problem = "added masses mx, my, Jz: expected a positive inertia, got none"
-    return _mass_unit(p) * _with_arms(total_inertia(p, added, problem), p)
+    prime = total_inertia(p, derivatives, problem)
+    return _mass_unit(p) * _with_arms(prime, p)
 
 
 def _tanker(model: ManoeuvringModel, water_depth: float) -> Floats:
@@ -74,5 +83,4 @@ def _tanker(model: ManoeuvringModel, water_depth: float) -> Floats:
     surge = c["m11"] - c["X_udotz"] * z
     sway = c["m22"] - c["Y_vdotz"] * z
     yaw = (c["m33"] - c["N_rdotz"] * z) * p["length"] ** 2
-    diagonal = np.array([surge, sway, yaw])
-    return float(p["mass"]) * diagonal[:, None] * np.eye(3, 4)
+    return float(p["mass"]) * np.diag([surge, sway, yaw, 0.0])

@@ -62,24 +62,6 @@ class ManoeuvringModel:
                 f" in 1/s, because structure {self.structure!r} has a shaft speed, got"
                 f" {shaft:g}"
             )
-        n = len(coefficients)
-        square = (n, n)
-        if self.covariance is not None and self.covariance.shape != square:
-            raise InputError(
-                f"covariance of {self.name!r}: expected shape {square}, one row and"
-                f" column a coefficient, got {self.covariance.shape}"
-            )
-        if self.draws is not None:
-            self._check_draws(self.draws)
-
-    def _check_draws(self, draws: Floats) -> None:
-        """Refuse draws of another shape."""
-        n = len(self.coefficients)
-        if draws.ndim != 2 or draws.shape[1] != n or len(draws) < 2:
-            raise InputError(
-                f"draws of {self.name!r}: expected at least two rows of {n}"
-                f" coefficients, got shape {draws.shape}"
-            )
 
     def _checked_coefficients(self) -> dict[str, float]:
         """Coefficients as floats, in the order of the structure."""

@@ -202,12 +202,6 @@ class Particulars(Mapping[str, Any]):
         table = dict(check_table(mapping, where, (*NAMES, "added_mass", "estimated")))
         added = table.pop("added_mass", None) or {}
         check_table(added, f"{where} added_mass", ADDED_MASSES)
-        for name in added:
-            if name in table:
-                raise InputError(
-                    f"{where} added_mass: expected each value in one place, got {name}"
-                    " twice"
-                )
         if table.get("length") is None:
             raise InputError(
                 f"{where} length: expected the length between perpendiculars in m, got"
@@ -215,7 +209,7 @@ class Particulars(Mapping[str, Any]):
             )
         estimated: Any = table.pop("estimated", None) or ()
         with placed(where, " "):
-            return cls(**table, **added, estimated=estimated)
+            return cls(**(table | added), estimated=estimated)
 
     def to_dict(self) -> dict[str, Any]:
         """Values by name, ready for JSON; :meth:`from_mapping` reads them."""
@@ -449,30 +443,22 @@ def check_together(values: Mapping[str, float]) -> None:
 def _check_mass(values: Mapping[str, float]) -> None:
     """Refuse a mass, kg, that does not fit the dimensions."""
     mass = values["mass"]
-    length = values["length"]
-    beam = values.get("beam")
-    draught = values.get("draught")
     density = values.get("water_density", SEA_WATER)
-    if beam is None or draught is None:
-        cube = density * length**3
-        low = 2e-4 * cube
-        high = 0.2 * cube
-        reason = "0.0002 to 0.2 times water_density * length^3"
-    else:
-        box = density * length * beam * draught
-        low = 0.2 * box
-        high = box
+    unit = density * values["length"] ** 3
+    low, high = 2e-4, 0.2
+    reason = "0.0002 to 0.2 times water_density * length^3"
+    if "beam" in values and "draught" in values:
+        unit = density * values["length"] * values["beam"] * values["draught"]
+        low, high = 0.2, 1.0
         reason = "a block coefficient of 0.2 to 1"
-        if "block_coefficient" in values:
-            displaced = box * values["block_coefficient"]
-            low = 0.5 * displaced
-            high = 2.0 * displaced
+        if fullness := values.get("block_coefficient"):
+            low, high = 0.5 * fullness, 2.0 * fullness
             reason = "half to twice what block_coefficient gives"
 
-    if not low <= mass <= high:
+    if not low * unit <= mass <= high * unit:
         raise InputError(
-            f"mass: expected {low:.4g} to {high:.4g} kg ({reason}), got {mass:g};"
-            " check the units (kg, not tonnes)"
+            f"mass: expected {low * unit:.4g} to {high * unit:.4g} kg ({reason}), got"
+            f" {mass:g}; check the units (kg, not tonnes)"
         )
 
 

@@ -7,7 +7,7 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from shipgym.checks import check_choice, check_keys, check_table, placed, unexpected
+from shipgym.checks import check_choice, check_table, placed, unexpected
 from shipgym.errors import InputError
 from shipgym.files import shipped_toml
 from shipgym.ships.term_table import Structure
@@ -177,14 +177,8 @@ def register_structure(
 
 def own_structure(table: Any, where: str) -> Structure:
     """Structure from `register_structure`'s arguments; errors begin with `where`."""
-    own: dict[str, Any] = {**USUAL, **check_table(table, where)}
-    check_keys(own, ("name", "equations", *USUAL), where)
-    for key in ("name", "equations"):
-        if key not in own:
-            raise InputError(
-                f'{where}: expected a name and equations, such as r = "r, delta", got'
-                f" no {key}"
-            )
+    needed = ("name", "equations")
+    own = USUAL | dict(check_table(table, where, (*needed, *USUAL), needed))
     equations = check_table(own["equations"], f"{where}: equations")
     own["equations"] = {
         equation: _terms(given, f"{where}: equations.{equation}")

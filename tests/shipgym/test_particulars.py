@@ -130,7 +130,6 @@ def test_particulars_are_a_mapping_and_go_through_json():
         ),
         ({"added_mass": {"Y_vdot": -2500.0}}, "in the prime system"),
         ({"added_mass": {"Yvdot": -0.01}}, "Did you mean 'Y_vdot'?"),
-        ({"added_mass": {"Y_vdot": -0.01}, "Y_vdot": -0.01}, "got Y_vdot twice"),
         ({"added_mass": 3}, "expected a table"),
         ({"estimated": ["colour"]}, "expected a list of names"),
     ],

@@ -92,7 +92,7 @@ def kinetic_energy(model, trial):
     """Of ship and entrained water: half of nu' M nu, with the symmetric part of M."""
     mass = inertia(model)
     nu = np.array([trial[name] for name in "uvr"])
-    energy = 0.5 * np.einsum("in,ij,jn->n", nu, mass[:, :3], nu)
+    energy = 0.5 * np.einsum("in,ij,jn->n", nu, mass[:3, :3], nu)
     if "p" in trial.channels:
         numbers, p = model.coefficients, model.particulars
         unit = 0.5 * p["water_density"] * p["length"] ** 3
@@ -167,7 +167,7 @@ def test_inertia_of_each_ship_is_that_of_her_source():
         ]
     )
     kvlcc2 = shipgym.load_model("kvlcc2")
-    np.testing.assert_allclose(inertia(kvlcc2), expected)
+    np.testing.assert_allclose(inertia(kvlcc2)[:3], expected)
 
     unit, L = 0.5 * 1025.0 * 175.0**3, 175.0
     container = shipgym.load_model("container")
@@ -182,7 +182,7 @@ def test_inertia_of_each_ship_is_that_of_her_source():
 
     tanker = shipgym.load_model("tanker")
     shallow = 18.46 / (37.0 - 18.46)
-    in_tons = np.diag(inertia(tanker, 37.0)[:, :3]) / 225.5e6
+    in_tons = np.diag(inertia(tanker, 37.0)[:3, :3]) / 225.5e6
     yaw = (0.1232 + 0.0045 * shallow) * 304.8**2
     np.testing.assert_allclose(
         in_tons, [1.05 + 0.05 * shallow, 2.02 + 0.387 * shallow, yaw]
