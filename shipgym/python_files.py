@@ -66,17 +66,13 @@ def working_folder() -> Iterator[None]:
 def _not_executed(path: Path, resolved: str, error: BaseException) -> InputError:
     """Error of a file that failed: its line, and that of what it imports."""
     line = getattr(error, "lineno", None)  # of a SyntaxError
-    imported = ""
     for frame in extract_tb(error.__traceback__):
         if frame.filename == resolved:
             line = frame.lineno
-        elif not frame.filename.startswith(("<", *LIBRARIES)):
-            imported = f" ({frame.filename}, line {frame.lineno})"
     place = f"{path}, line {line}" if line else str(path)
     if isinstance(error, InputError):
         return InputError(f"{place}: {error}")
-    why = f"{type(error).__name__}: {error}{imported}"
-    return InputError(f"{place}: cannot be executed: {why}")
+    return InputError(f"{place}: cannot be executed: {told(error)}")
 
 
 def check_function(

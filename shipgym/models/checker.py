@@ -94,45 +94,32 @@ def _states(model: ShipModel) -> dict[str, Floats]:
     return states
 
 
-def _rates(model: ShipModel) -> list[str]:
-    """Velocities of the model, and its memory of yaw: what has an acceleration."""
-    return [name for name in EQUATION_NAMES if name in model.state_names]
-
-
-def _accelerations(model: ShipModel, channels: dict[str, Floats]) -> Floats:
-    """Accelerations in the order of `_rates`, shape (n, n_rates)."""
+def _accelerations(model: ShipModel, channels: dict[str, Floats]) -> dict[str, Floats]:
+    """Accelerations by the velocities, and the memory of yaw, that the model has."""
     rates = model.rates(channels)
-    return np.stack([rates[name] for name in _rates(model)], axis=-1)
+    return {name: rates[name] for name in EQUATION_NAMES if name in rates}
 
 
 def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
     channels = _states(model)
-    found = _accelerations(model, channels)
-    wrong = np.argwhere(~np.isfinite(found))
-    if len(wrong):
-        row, column = wrong[0].tolist()
+    for rate, values in _accelerations(model, channels).items():
+        wrong = np.flatnonzero(~np.isfinite(values))
+        if not wrong.size:
+            continue
+        row = wrong[0]
         at = {name: float(values[row]) for name, values in channels.items()}
-        yield _no_acceleration(model, _rates(model)[column], at, found[row, column])
-
-
-def _no_acceleration(
-    model: ShipModel, rate: str, at: dict[str, float], value: float
-) -> str:
-    """Problem of an acceleration that is not a number at a state."""
-    known = (*EQUATION_NAMES, "phi", "delta")
-    names = [name for name in known if name in model.state_names]
-    state = ", ".join(f"{name} = {at[name]:.4g}" for name in names)
-    look = "for coefficients that are far too large"
-    if isinstance(model.dynamics, ShipEquations):
-        numbers = model.dynamics.numbers(
-            model.coefficients, model.particulars, model.service_shaft_speed
+        state = ", ".join(f"{name} = {value:.4g}" for name, value in at.items())
+        look = "for coefficients that are far too large"
+        if isinstance(model.dynamics, ShipEquations):
+            numbers = model.dynamics.numbers(
+                model.coefficients, model.particulars, model.service_shaft_speed
+            )
+            look = f"at {model.dynamics.fault(at, numbers.tolist(), ship_of(model))}"
+        yield (
+            f"derivatives: expected a number for the acceleration of '{rate}' at"
+            f" {state} (SI units), got {values[row]}; look {look}"
         )
-        place = model.dynamics.fault(at, numbers.tolist(), ship_of(model))
-        look = f"at {place}"
-    return (
-        f"derivatives: expected a number for the acceleration of '{rate}' at {state}"
-        f" (SI units), got {value}; look {look}"
-    )
+        return
 
 
 def _asymmetry(model: ShipModel) -> float:
@@ -140,17 +127,18 @@ def _asymmetry(model: ShipModel) -> float:
     channels = _states(model)
     odd = ("v", "r", "p", "phi", "q", "delta")
     mirrored = channels | {name: -channels[name] for name in odd}
-    rates = _rates(model)
-    sign = [-1.0 if name in odd else 1.0 for name in rates]
-    ours = _accelerations(model, channels)
-    image = sign * _accelerations(model, mirrored)
-
     length = model.particulars["length"]
     units = dict.fromkeys(ANGULAR, length) | {"q": length * model.travel_time}
-    unit = [units.get(name, 1.0) for name in rates]  # prime, but for what all have
-    size = _root_mean_square(ours * unit)
-    difference = _root_mean_square((ours - image) * unit)
-    return 0.0 if size == 0.0 else difference / (2.0 * size)
+    ours = _accelerations(model, channels)
+    theirs = _accelerations(model, mirrored)
+    sizes, differences = [], []
+    for name, values in ours.items():
+        unit = units.get(name, 1.0)  # prime, but for what all have
+        image = -theirs[name] if name in odd else theirs[name]
+        sizes.append(unit * values)
+        differences.append(unit * (values - image))
+    size = _root_mean_square(np.array(sizes))
+    return 0.0 if size == 0.0 else 0.5 * _root_mean_square(np.array(differences)) / size
 
 
 def _root_mean_square(values: Floats) -> float:

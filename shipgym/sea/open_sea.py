@@ -28,6 +28,15 @@ from shipgym.sea.filters import (
 from shipgym.sea.series import Cosines, Sines, sum_of_cosines, sum_of_sines
 
 
+class Response(NamedTuple):
+    """Accelerations of a ship, series over where wind or waves come from."""
+
+    surge: Cosines
+    sway: Sines
+    yaw: Sines
+    roll: Sines
+
+
 class SeaParameters(NamedTuple):
     """The sea of a ship; a direction that is NaN is drawn for each episode."""
 
@@ -44,17 +53,10 @@ class SeaParameters(NamedTuple):
     wave_ringing: float  # sqrt(1 - lambda^2)
     drift: Filter  # parts of the mean drift force
     still_air: float  # 1/m, surge deceleration by speed^2 that the model has of itself
-    # accelerations by (relative wind)^2, over the angle of the relative wind
-    wind_surge: Cosines
-    wind_sway: Sines
-    wind_yaw: Sines
-    wind_roll: Sines
-    # accelerations by the mean drift force, variances of the first-order motion, over
-    # the angle of the waves
-    drift_surge: Cosines
-    drift_sway: Sines
-    drift_yaw: Sines
-    drift_roll: Sines
+    by_wind: Response  # by (relative wind)^2, over the angle of the relative wind
+    # to the mean drift force, and variances of the first-order motion, over the angle
+    # of the waves
+    by_waves: Response
     heading_variance: Cosines
     roll_variance: Cosines  # (rad/s2)^2, of the acceleration by the slope of the waves
 
@@ -146,11 +148,13 @@ def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
         return CALM
     sine, cosine = sin_cos(motion.psi)
     felt = relative_wind(motion, sine, cosine, sea, p)
-    wind = by_wind(motion, felt, p)
+    wind = accelerations(felt.angle, felt.squared_speed, p.by_wind)
+    # the model's own surge has the resistance of still air already
+    still_air = motion.u * fabs(motion.u) * p.still_air
     waves = from_bow(sine, cosine, sea.waves_north, sea.waves_east)
-    drift = by_waves(waves, 1.0 + sea.drift, p)
+    drift = accelerations(waves, 1.0 + sea.drift, p.by_waves)
     return Push(
-        wind.surge + drift.surge,
+        wind.surge + still_air + drift.surge,
         wind.sway + drift.sway,
         wind.yaw + drift.yaw,
         wind.roll + drift.roll + by_wave_slope(waves, sea, p),
@@ -159,34 +163,16 @@ def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
     )
 
 
-def by_wind(motion: Motion, wind: RelativeWind, p: SeaParameters) -> Accelerations:
-    """Accelerations by the relative wind, beyond those that the model has of itself."""
-    cosine, sine = wind.angle
-    squared = wind.squared_speed
-    # the model's own surge has the resistance of still air already
-    still_air = motion.u * fabs(motion.u) * p.still_air
-    surge = squared * sum_of_cosines(cosine, p.wind_surge)
+def accelerations(angle: FromBow, size: float, series: Response) -> Accelerations:
+    """Accelerations of a response at an angle, times its size."""
+    cosine, sine = angle
     roll = 0.0
     if HAS_ROLL:
-        roll = squared * sum_of_sines(cosine, sine, p.wind_roll)
+        roll = size * sum_of_sines(cosine, sine, series.roll)
     return Accelerations(
-        surge=surge + still_air,
-        sway=squared * sum_of_sines(cosine, sine, p.wind_sway),
-        yaw=squared * sum_of_sines(cosine, sine, p.wind_yaw),
-        roll=roll,
-    )
-
-
-def by_waves(waves: FromBow, drift: float, p: SeaParameters) -> Accelerations:
-    """Accelerations by the drift force, which is `drift` times its mean."""
-    cosine, sine = waves
-    roll = 0.0
-    if HAS_ROLL:
-        roll = drift * sum_of_sines(cosine, sine, p.drift_roll)
-    return Accelerations(
-        surge=drift * sum_of_cosines(cosine, p.drift_surge),
-        sway=drift * sum_of_sines(cosine, sine, p.drift_sway),
-        yaw=drift * sum_of_sines(cosine, sine, p.drift_yaw),
+        surge=size * sum_of_cosines(cosine, series.surge),
+        sway=size * sum_of_sines(cosine, sine, series.sway),
+        yaw=size * sum_of_sines(cosine, sine, series.yaw),
         roll=roll,
     )
 

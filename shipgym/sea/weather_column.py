@@ -14,7 +14,7 @@ from shipgym.sea.filters import Filter, GaussMarkov
 from shipgym.sea.harmonics import Curves, cosine_coefficients, harmonics
 from shipgym.sea.mobility import mobility_matrix, roll_stiffness
 from shipgym.sea.motions import wave_motion
-from shipgym.sea.open_sea import SeaParameters
+from shipgym.sea.open_sea import Response, SeaParameters
 from shipgym.sea.series import Cosines, Sines
 from shipgym.sea.waves import slow_drift, wave_filter
 from shipgym.sea.wind import AIR_DENSITY, gust_filter, wind_curves
@@ -66,17 +66,13 @@ def with_wind(
     """Parameters of a sea with a wind, and what it does to a ship."""
     mobility = mobility_matrix(model, water_depth)
     curves = wind_curves(model.particulars, wind.coefficients)
-    by_wind = _accelerations(mobility, harmonics(curves, HARMONICS, 0.5 * AIR_DENSITY))
-    of_her_own_wind = float(by_wind.X.sum())  # at angle 0
+    by_wind = _response(mobility, harmonics(curves, HARMONICS, 0.5 * AIR_DENSITY))
     return sea._replace(
         wind_speed=wind.speed,
         wind_from=_radians(wind.from_deg),
         gust=discrete(gust_filter(wind), step),
-        wind_surge=Cosines(*by_wind.X),
-        wind_sway=Sines(*by_wind.Y),
-        wind_yaw=Sines(*by_wind.N),
-        wind_roll=Sines(*by_wind.K),
-        still_air=-of_her_own_wind,
+        by_wind=by_wind,
+        still_air=-sum(by_wind.surge),  # of her own wind, at angle 0
     )
 
 
@@ -92,7 +88,6 @@ def with_waves(
     spectrum = wave_filter(waves)
     drift = wave_drift(waves, model.particulars)
     heading, slope = wave_motion(waves, model.particulars)
-    by_waves = _accelerations(mobility, harmonics(drift, HARMONICS))
     return sea._replace(
         waves_from=_radians(waves.from_deg),
         wave_frequency=spectrum.peak_frequency,
@@ -100,10 +95,7 @@ def with_waves(
         wave_damping=spectrum.damping,
         wave_ringing=float(np.sqrt(1.0 - spectrum.damping**2)),
         drift=discrete(slow_drift(waves, model.particulars), step),
-        drift_surge=Cosines(*by_waves.X),
-        drift_sway=Sines(*by_waves.Y),
-        drift_yaw=Sines(*by_waves.N),
-        drift_roll=Sines(*by_waves.K),
+        by_waves=_response(mobility, harmonics(drift, HARMONICS)),
         heading_variance=_variances(heading),
         roll_variance=_variances((roll_stiffness(model) * mobility[3, 3]) ** 2 * slope),
     )
@@ -134,8 +126,8 @@ def _radians(degrees: float | None) -> float:
     return float("nan") if degrees is None else float(np.radians(degrees))
 
 
-def _accelerations(mobility: Floats, forces: Curves) -> Curves:
+def _response(mobility: Floats, forces: Curves) -> Response:
     """Series of accelerations in surge, sway, yaw and roll by those of forces."""
-    lateral = mobility[1:, 1:] @ np.stack([forces.Y, forces.N, forces.K])
-    sway, yaw, roll = lateral
-    return Curves(mobility[0, 0] * forces.X, sway, yaw, roll)
+    lateral = mobility[1:, 1:] @ np.stack(forces[1:])
+    surge = mobility[0, 0] * forces.X
+    return Response(Cosines(*surge), *(Sines(*series) for series in lateral))
