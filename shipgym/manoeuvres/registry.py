@@ -30,7 +30,7 @@ class Manoeuvre:
     indices: Callable[[Trial], Any]  # from the trial to its indices
     outcome: type  # the dataclass of its indices, units in the names of its fields
     caption: str = ""  # caption of its figure
-    # from the run to its figure; by default one for its kind
+    # from the run to its figure; by default its time histories
     # (`shipgym.plots.manoeuvre_figure`)
     figure: Callable[[Trial], Figure] | None = None
 

@@ -48,14 +48,6 @@ class TurningIndices:
     steady_drift_deg: float | None
 
 
-class TrackFromOrder(NamedTuple):
-    """Track from the position and along the heading at which the rudder was ordered."""
-
-    ahead: Floats  # ship lengths, shape (n_samples,)
-    aside: Floats  # to starboard, ship lengths
-    turned: Floats  # change of heading, rad
-
-
 class _SteadyTurn(NamedTuple):
     diameter_lengths: float | None
     speed_ratio: float | None
@@ -103,12 +95,20 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
     """
     require(trial, ("x", "y", "psi"), "a turning circle")
     lpp = ship_length(trial, length)
-    track = track_from_order(trial, lpp)
-    after = trial.t >= execute_time(trial)
-    side = 1.0 if track.turned[-1] >= 0.0 else -1.0
-    ahead = track.ahead[after]
-    aside = side * track.aside[after]
-    turned = side * track.turned[after]
+    start = execute_time(trial)
+    after = trial.t >= start
+
+    def since(channel: str) -> Floats:
+        values = trial[channel]
+        return np.asarray(values - np.interp(start, trial.t, values))
+
+    turned = since("psi")
+    heading = float(trial["psi"][0] - turned[0])
+    ahead, aside = rotate_to_body(since("x"), since("y"), heading)
+    side = 1.0 if turned[-1] >= 0.0 else -1.0
+    ahead = ahead[after] / lpp
+    aside = side * aside[after] / lpp
+    turned = side * turned[after]
 
     half_turn = np.pi
     quarter_turn = np.pi / 2
@@ -123,20 +123,6 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
         steady_speed_ratio=steady.speed_ratio,
         steady_drift_deg=steady.drift_deg,
     )
-
-
-def track_from_order(trial: Trial, length: float) -> TrackFromOrder:
-    """Track from where the rudder was ordered, for a ship of some length, m."""
-    start = execute_time(trial)
-
-    def since(channel: str) -> Floats:
-        values = trial[channel]
-        return np.asarray(values - np.interp(start, trial.t, values))
-
-    turned = since("psi")
-    heading = float(trial["psi"][0] - turned[0])
-    ahead, aside = rotate_to_body(since("x"), since("y"), heading)
-    return TrackFromOrder(ahead / length, aside / length, turned)
 
 
 def _steady_turn(
@@ -172,10 +158,6 @@ def standard_circles(
     """Turning circles with full rudder to both sides."""
     duration, dt = standard_time(model)
     full = full_rudder_deg(model)
-    caption = (
-        "Path from above, from the position and along the heading at which the rudder"
-        " was ordered."
-    )
     circles = {}
     for side, sign in SIDES:
         sail = partial(
@@ -186,5 +168,5 @@ def standard_circles(
             water_depth=water_depth,
         )
         name = f"turning circle {full:.0f} deg to {side}"
-        circles[name] = Manoeuvre(sail, turning_indices, TurningIndices, caption)
+        circles[name] = Manoeuvre(sail, turning_indices, TurningIndices)
     return circles

@@ -244,10 +244,6 @@ def standard_zigzags(
 ) -> dict[str, Manoeuvre]:
     """Zigzags 10/10 and 20/20 to both sides; one that never reverses has no indices."""
     duration, dt = standard_time(model)
-    caption = (
-        "Heading change and rudder in degrees; dotted: the heading at which the rudder"
-        " is reversed."
-    )
     zigzags = {}
     for angle in STANDARD_DEG:
         for side, sign in SIDES:
@@ -262,5 +258,5 @@ def standard_zigzags(
                 must_reverse=False,
             )
             name = f"zigzag {angle:.0f}/{angle:.0f}, {side} first"
-            zigzags[name] = Manoeuvre(sail, zigzag_indices, ZigzagIndices, caption)
+            zigzags[name] = Manoeuvre(sail, zigzag_indices, ZigzagIndices)
     return zigzags

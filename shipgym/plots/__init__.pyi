@@ -1,7 +1,4 @@
 from .axes import draw as draw
-from .manoeuvres import manoeuvre_figure as manoeuvre_figure
-from .manoeuvres import turning_figure as turning_figure
-from .manoeuvres import zigzag_figure as zigzag_figure
 from .style import LIMIT as LIMIT
 from .style import MEASURED as MEASURED
 from .style import MODEL as MODEL
@@ -18,4 +15,5 @@ from .style import points as points
 from .style import translucent as translucent
 from .trials import CHANNEL_AXES as CHANNEL_AXES
 from .trials import history_figure as history_figure
+from .trials import manoeuvre_figure as manoeuvre_figure
 from .trials import path_figure as path_figure

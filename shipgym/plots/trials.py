@@ -40,6 +40,12 @@ def history_figure(
     return panels(shown, height, outer=True, grid=grid)
 
 
+def manoeuvre_figure(sailed: Trial) -> Figure:
+    """Plot the time histories of a manoeuvre; InputError without any channel of it."""
+    channels = ("psi", "delta", "r", "speed", "drift")
+    return history_figure({sailed.name: sailed}, channels)
+
+
 def history_panel(trials: Mapping[str, Trial], channel: str) -> Panel:
     """One channel of all trials that have it, over time."""
     title, factor = CHANNEL_AXES[channel]

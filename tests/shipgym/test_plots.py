@@ -5,19 +5,12 @@ import pytest
 from matplotlib.figure import Figure
 
 from shipgym import InputError, Trial, load_model
-from shipgym.manoeuvres import (
-    standard_manoeuvres,
-    turning_circle,
-    turning_indices,
-    zigzag,
-)
+from shipgym.manoeuvres import turning_circle
 from shipgym.plots import (
     CHANNEL_AXES,
     history_figure,
     manoeuvre_figure,
     path_figure,
-    turning_figure,
-    zigzag_figure,
 )
 
 DERIVED = ("speed", "drift")  # channels that u and v give
@@ -71,44 +64,16 @@ def test_a_trial_without_position_has_no_path():
         path_figure({"run": trial})
 
 
-def test_a_zigzag_is_drawn_as_the_change_of_heading_with_its_rudder():
-    run = zigzag(load_model("mariner"), 20.0, 20.0, duration=200.0, dt=1.0)
-    figure = zigzag_figure(run)
-    assert values(figure, "y", 0)[0] == 0.0
-    assert values(figure, "y", 1).max() == pytest.approx(20.0, abs=0.1)
-
-
 def test_without_plotly_the_message_says_what_to_install(monkeypatch, circle):
     monkeypatch.setitem(sys.modules, "plotly.subplots", None)
     with pytest.raises(InputError, match=r"pip install 'shipgym\[report\]'"):
         path_figure({"turn": circle})
 
 
-def test_a_turning_circle_is_drawn_with_its_indices():
-    trial = turning_circle(load_model("mariner"), -35.0, dt=1.0)
-    indices, figure = turning_indices(trial), turning_figure(trial)
-    marks = {trace.name.rsplit(" ", 2)[0]: trace for trace in figure.data}
-    assert np.ptp(np.asarray(marks["advance"].y, dtype=float)) == pytest.approx(
-        indices.advance_lengths
-    )
-    assert np.ptp(np.asarray(marks["transfer"].x, dtype=float)) == pytest.approx(
-        indices.transfer_lengths
-    )
-    diameter = np.asarray(marks["tactical diameter"].x, dtype=float)
-    assert diameter.min() == pytest.approx(-indices.tactical_diameter_lengths)
-
-
-def test_every_manoeuvre_has_its_figure():
-    ship = load_model("tanker")
-    axes = {
-        "zigzag 20/20, port first": "heading change and rudder, deg",
-        "turning circle 35 deg to port": "ahead, ship lengths",
-        "crash stop": "heading, deg",
-    }
-    known = standard_manoeuvres(ship)
-    for name, title in axes.items():
-        figure = manoeuvre_figure(known[name].sail(ship))
-        assert figure.layout.yaxis.title.text == title
+def test_a_manoeuvre_is_drawn_over_time(circle):
+    figure = manoeuvre_figure(circle)
+    assert figure.layout.yaxis.title.text == "heading, deg"
+    assert figure.layout.yaxis5.title.text == "drift angle, deg"
 
 
 def test_a_trial_is_drawn_on_the_axes_of_a_user(circle, monkeypatch):
