@@ -90,35 +90,37 @@ def plan_of(state: Any, lane: int) -> Any:
     return state[PLAN_ROW * LANES + lane :: LANES]
 
 
+def copy_lanes(
+    target: Any, first: int, step: int, source: Any, row: int, begin: int, end: int
+) -> None:
+    """Copy a row of some lanes into an array, `step` entries apart from `first` on."""
+    for lane in range(begin, end):
+        entry = np.uintp(first + lane * step)
+        target[entry] = source[np.uintp(row + lane)]
+
+
 @called
 def write_outputs(tile: Tile, outputs: OutputTables, begin: int, end: int) -> None:
     """Copy results of some lanes into the users' arrays."""
     first = tile.first
-    result = tile.result
-    observations = outputs.observations
+    n_ships = outputs.n_ships
+    outcomes = outputs.outcomes
     width = len(outputs.observed)
     for column in range(width):
-        source = outputs.observed[column]
-        target = first * width + column
-        for lane in range(begin, end):
-            entry = np.uintp(target + lane * width)
-            observations[entry] = result[np.uintp(source + lane)]
+        at = first * width + column
+        row = outputs.observed[column]
+        copy_lanes(outputs.observations, at, width, tile.result, row, begin, end)
 
-    outcomes = outputs.outcomes
-    n_ships = outputs.n_ships
-    for row in range(len(outputs.informed)):
-        source = outputs.informed[row]
-        target = first + row * n_ships
-        for lane in range(begin, end):
-            outcomes[np.uintp(target + lane)] = result[np.uintp(source + lane)]
+    for number in range(len(outputs.informed)):
+        at = first + number * n_ships
+        row = outputs.informed[number]
+        copy_lanes(outcomes, at, 1, tile.result, row, begin, end)
 
-    state = tile.state
     behind = first + len(outputs.informed) * n_ships
-    for row in range(len(outputs.reported)):
-        source = outputs.reported[row]
-        target = behind + row * n_ships
-        for lane in range(begin, end):
-            outcomes[np.uintp(target + lane)] = state[np.uintp(source + lane)]
+    for number in range(len(outputs.reported)):
+        at = behind + number * n_ships
+        row = outputs.reported[number]
+        copy_lanes(outcomes, at, 1, tile.state, row, begin, end)
 
     flags = outputs.flags
     for row in range(len(outputs.flagged)):

@@ -41,17 +41,17 @@ class IndexInterval:
 
         It contains the value of the model itself. Draws that ran away or were not
         completed count at the upper end of a size, and the upper end is None where they
-        reach it: there is no upper bound. Those of another index, such as a drift
-        angle, may lie at either end, and the interval is None where they reach them;
-        so it is without draws.
+        reach it: there is no upper bound. Another index, such as a drift angle, has no
+        interval where more than 2.5 per cent of the draws have none; so has one without
+        draws.
         """
-        if not len(self.values):
+        draws = len(self.values)
+        without = self.n_ran_away + self.n_never_reached
+        if not draws or not (self.is_size or without <= LEVELS_95[0] * draws):
             return None
         low, high = self.quantiles(*LEVELS_95)
         if self.value is None:  # the model itself did not complete it
             return None if low is None or not self.is_size else (low, None)
-        if high is None and not self.is_size:
-            return None
         lower = self.value if low is None else min(low, self.value)
         upper = None if high is None else max(high, self.value)
         return lower, upper
@@ -70,23 +70,14 @@ class IndexInterval:
     def quantiles(self, *levels: float) -> tuple[float | None, ...]:
         """Quantiles over the draws; None where there is no bound, or no draw.
 
-        Of a draw without value a size is larger than any; another index lies below low
-        levels and above high ones, and does not count in the median.
+        Of a draw without value a size is larger than any; another index does not count.
         """
         without = np.isnan(self.values)
-        if self.is_size:
-            sizes = np.maximum(self.values, 0.0)
-            sizes[without] = np.inf
-            return quantiles(sizes, *levels)
-
-        # what did not finish lies below low levels and above high ones, and does not
-        # count in the median
-        found: list[float | None] = []
-        for level in levels:
-            values = self.values[~without] if level == 0.5 else self.values.copy()
-            values[np.isnan(values)] = np.copysign(np.inf, level - 0.5)
-            found += quantiles(values, level)
-        return tuple(found)
+        if not self.is_size:
+            return quantiles(self.values[~without], *levels)
+        sizes = np.maximum(self.values, 0.0)
+        sizes[without] = np.inf
+        return quantiles(sizes, *levels)
 
     def to_dict(self) -> dict[str, Any]:
         """Value, interval and counts, as JSON knows them."""

@@ -6,16 +6,13 @@ container ship, J. Soc. Naval Architects of Japan 150; in the form of the functi
 instantaneous speed; u' is the total surge speed over U.
 """
 
-from collections import Counter
-from collections.abc import Callable
 from math import copysign, fabs, pi, sqrt
 from typing import Any, NamedTuple
 
 from shipgym.engine.mathematics import small_sin_cos
 from shipgym.engine.motion import Motion, Ship
-from shipgym.engine.record_code import written
 from shipgym.ships.equations import ShipEquations, published
-from shipgym.ships.term_functions import factored
+from shipgym.ships.term_functions import letter_sum
 
 LENGTH = 175.0  # m
 WEIGHT = 9.81 * 21222.0  # by density, m^4/s^2, of the displaced volume
@@ -40,20 +37,10 @@ class State(NamedTuple):
     f: float  # heel
 
 
-def hull(axis: str) -> Callable[[State, Any], float]:
-    """Write the force or moment of the hull about an axis by its coefficients.
-
-    To third order in sway, turn and heel, linear in roll.
-    """
-    monomials = [(f"c.{axis}_{term}", Counter(term)) for term in TERMS]
-    makings = [f"{name} = at.{name}" for name in State._fields]
-    body = [*makings, f"return {factored(monomials)}"]
-    return written(f"hull_{axis}", "at, c", body, {})
-
-
-sway_force = hull("Y")
-roll_moment = hull("K")
-yaw_moment = hull("N")
+# of the hull, to third order in sway, turn and heel, linear in roll
+sway_force = letter_sum("Y", TERMS)
+roll_moment = letter_sum("K", TERMS)
+yaw_moment = letter_sum("N", TERMS)
 
 
 def accelerations(

@@ -147,19 +147,17 @@ class ShipEquations:
         motion = Motion(**dict.fromkeys(Motion._fields, 0.0) | at)
         c = self.coefficients_record()
         found = asked(self.accelerations, motion, c, ship)
-        if not isinstance(found, tuple) or len(found) != len(ACCELERATIONS):
+        is_five = isinstance(found, tuple) and len(found) == len(ACCELERATIONS)
+        if not is_five or not all(isinstance(one, (int, float)) for one in found):
             expected = (
                 "five numbers, a tuple: udot, vdot, rdot, pdot, qdot, 0 for those that"
                 " the ship does not have"
             )
             raise unexpected("accelerations", expected, found)
-        rates = dict(zip(ACCELERATIONS, found, strict=True))
         if self.shaft_acceleration is not None:
             rate = asked(self.shaft_acceleration, n, 0.9 * n, c, ship)
-            rates["shaft_acceleration"] = rate
-        for name, value in rates.items():
-            if not isinstance(value, (int, float)):
-                raise unexpected(name, "a number, int or float", value)
+            if not isinstance(rate, (int, float)):
+                raise unexpected("shaft_acceleration", "a number, int or float", rate)
 
     def fault(
         self, state: Mapping[str, float], numbers: Sequence[Any], ship: Ship

@@ -25,6 +25,7 @@ from shipgym.ships.particulars import Particulars
 from shipgym.ships.reference_ships import published_ships
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import MMG
+from shipgym.ships.term_functions import letter_sum
 
 #: Coefficients that are identified: hull by rho L d U^2 / 2 (moments L more), added
 #: mass by rho L^2 d / 2 (rho L^4 d / 2). C_2 is the mean of the sides and C_2_side half
@@ -247,36 +248,33 @@ def flow_of(motion: Motion, c: Any, ship: Ship) -> Flow:
     return Flow(U, v * per_U, r_, beta, inflow, K_T_nn)
 
 
+class Turn(NamedTuple):
+    """Sway by U and yaw rate by U / L."""
+
+    v: float
+    r: float
+
+
+surge_force = letter_sum("X", ("vv", "vr", "rr", "vvvv"))
+HIGHER = ("v", "vvv", "vvr", "vrr", "rrr")
+sway_force = letter_sum("Y", HIGHER)
+yaw_moment = letter_sum("N", HIGHER)
+
+
 def hull_forces(c: Any, flow: Flow, ship: Ship) -> tuple[float, float, float]:
     """Forces X_H, Y_H and moment N_H of the hull, polynomials in v' and r'."""
-    v, r = flow.v_, flow.r_
+    r = flow.r_
+    at = Turn(flow.v_, r)
     slowed = power_law(flow.U / ship.speed, c.speed_power)
-    X = (
-        -c.R_0
-        + c.X_vv * v * v
-        + c.X_vr * v * r
-        + c.X_rr * r * r
-        + c.X_vvvv * v * v * v * v
-    )
-    Y = (
-        c.Y_0
-        + c.Y_v * v
-        + c.Y_r * slowed * r
-        + c.Y_vvv * v * v * v
-        + c.Y_vvr * v * v * r
-        + c.Y_vrr * v * r * r
-        + c.Y_rrr * r * r * r
-    )
+    by_rate = slowed * r
+    X = surge_force(at, c) - c.R_0
+    Y = sway_force(at, c) + c.Y_0 + c.Y_r * by_rate
     N = (
-        c.N_0
-        + c.N_v * v
-        + c.N_r * slowed * r
+        yaw_moment(at, c)
+        + c.N_0
+        + c.N_r * by_rate
         + c.N_absr * fabs(r)
         + c.N_rr * r * r
-        + c.N_vvv * v * v * v
-        + c.N_vvr * v * v * r
-        + c.N_vrr * v * r * r
-        + c.N_rrr * r * r * r
     )
     q = 0.5 * ship.length * c.d * flow.U * flow.U
     return q * X, q * Y, q * ship.length * N

@@ -7,7 +7,7 @@ text of a model file becomes part of a program.
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from math import fabs, sqrt
 from operator import itemgetter
@@ -167,6 +167,19 @@ def factored(monomials: Sequence[Monomial]) -> str:
     if outside:
         product += f" + ({factored(outside)})"
     return product
+
+
+def letter_sum(axis: str, terms: Sequence[str]) -> Callable[..., float]:
+    """Write `sum(at, c)`: coefficients such as `c.Y_vvr` by products of `at`'s fields.
+
+    Each letter of a term is a field: `letter_sum("Y", ["v", "vvr"])` is `lambda at, c:
+    at.v * (c.Y_v + at.v * at.r * c.Y_vvr)`.
+    """
+    monomials = []
+    for term in terms:
+        powers = {f"at.{letter}": power for letter, power in Counter(term).items()}
+        monomials.append((f"c.{axis}_{term}", powers))
+    return written(f"sum_{axis}", "at, c", [f"return {factored(monomials)}"], {})
 
 
 def _product(coefficient: str, powers: Powers) -> str:
