@@ -10,11 +10,11 @@ from .errors import InputError as InputError
 from .errors import ManoeuvreError as ManoeuvreError
 from .errors import UnstableModelError as UnstableModelError
 from .examples import example_ship as example_ship
+from .findings import Findings as Findings
 from .models import ShipModel as ShipModel
 from .models import list_models as list_models
 from .models import load_model as load_model
 from .models import register_ship_equations as register_ship_equations
-from .models.checker import ModelCheck as ModelCheck
 from .models.checker import check_ship_model as check_ship_model
 from .sea.conditions import Current as Current
 from .sea.conditions import Waves as Waves

@@ -33,6 +33,7 @@ from shipgym.engine.motion import (
     Held,
     Motion,
     Push,
+    Rates,
     Ship,
     ground_velocity,
     lost,
@@ -52,6 +53,7 @@ SEA_CHANNELS = SeaChannels._fields
 #: (ship, rudder_limit, rudder_rate, gear_frequency)
 with_gear = changer(Ship, "rudder_limit", "rudder_rate", "gear_frequency")
 replaced = changer(Motion, "psi", "delta", "n")
+in_north = changer(Rates, "x", "y", "delta")
 
 
 def push_now(motion: Motion, sea: Any, parameters: Any) -> Push:
@@ -128,20 +130,10 @@ def derivatives(
         k = rates(motion, held, coefficients, ship)
         ahead, aside = ground_velocity(motion, 0.0, 0.0)
         sine, cosine = sin_cos(motion.psi)
-        derivative = Motion(
-            x=ahead * cosine - aside * sine,
-            y=ahead * sine + aside * cosine,
-            psi=k.psi,
-            u=k.u,
-            v=k.v,
-            r=k.r,
-            p=k.p,
-            phi=k.phi,
-            q=k.q,
-            delta=rudder_velocity(motion.delta, order, ship),
-            n=k.n,
-        )
-        store_motion(out[i], 0, derivative)
+        x = ahead * cosine - aside * sine
+        y = ahead * sine + aside * cosine
+        rudder = rudder_velocity(motion.delta, order, ship)
+        store_motion(out[i], 0, in_north(k, x, y, rudder))
 
 
 def simulate(

@@ -1,7 +1,6 @@
 """Checks for any ship model, including a user's own."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -14,35 +13,17 @@ from shipgym.models.ship_model import ShipModel
 from shipgym.models.simulate import orders
 from shipgym.ships.equations import ShipEquations
 from shipgym.ships.manoeuvring_model import ship_of
-from shipgym.ships.term_table import ANGULAR, EQUATION_NAMES, Structure
+from shipgym.ships.term_table import Structure
 from shipgym.trials.trial import Trial
 
 STRAIGHT_LENGTHS = 30.0  # ship lengths of a run
 
 
-@dataclass(frozen=True)
-class ModelCheck(Findings):
-    """Problems and remarks from a check of a model."""
-
-    # root mean square of the accelerations' port/starboard difference over twice their
-    # own, over states that a manoeuvre passes: 0 for a symmetric ship; nan where it
-    # could not be evaluated
-    asymmetry: float = field(kw_only=True)
-
-    @property
-    def verdict(self) -> str:
-        """Soundness in words, and how far port and starboard differ."""
-        return (
-            f"{super().verdict}; port/starboard asymmetry"
-            f" {100.0 * self.asymmetry:.1f} %"
-        )
-
-
-def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
+def check_ship_model(model: ShipModel | str | Path) -> Findings:
     """Check a model for errors.
 
     The file and its coefficients; the inertia; accelerations over the states that a
-    manoeuvre passes (finite, equal to both sides); straight running; the side to which
+    manoeuvre passes (finite); straight running; the side to which
     the rudder turns the ship; hard turns to both sides; the covariance.
 
     Given is a model, a shipped model's name or the path of a model file. A file that
@@ -56,21 +37,12 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
         model.ship_numbers()
         problems = list(_wrong_accelerations(model))
     except InputError as error:  # a file, numbers or equations that cannot be used
-        return ModelCheck(name, (str(error),), asymmetry=float("nan"))
-
-    remarks: list[str] = []
-    asymmetry = float("nan")
-    if not problems:
-        asymmetry = _asymmetry(model)
-        problems += _wrong_courses(model)
-        problems += _wrong_rudder(model)
-        remarks += _unusual(model, asymmetry)
-    return ModelCheck(
-        name,
-        tuple(problems),
-        tuple(remarks),
-        asymmetry=asymmetry,
-    )
+        return Findings(name, (str(error),))
+    if problems:
+        return Findings(name, tuple(problems))
+    problems += _wrong_courses(model)
+    problems += _wrong_rudder(model)
+    return Findings(name, tuple(problems), tuple(_unusual(model)))
 
 
 def _states(model: ShipModel) -> dict[str, Floats]:
@@ -94,15 +66,9 @@ def _states(model: ShipModel) -> dict[str, Floats]:
     return states
 
 
-def _accelerations(model: ShipModel, channels: dict[str, Floats]) -> dict[str, Floats]:
-    """Accelerations by the velocities, and the memory of yaw, that the model has."""
-    rates = model.rates(channels)
-    return {name: rates[name] for name in EQUATION_NAMES if name in rates}
-
-
 def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
     channels = _states(model)
-    for rate, values in _accelerations(model, channels).items():
+    for rate, values in model.rates(channels).items():
         wrong = np.flatnonzero(~np.isfinite(values))
         if not wrong.size:
             continue
@@ -120,29 +86,6 @@ def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
             f" {state} (SI units), got {values[row]}; look {look}"
         )
         return
-
-
-def _asymmetry(model: ShipModel) -> float:
-    """Difference of the accelerations from their mirror image by size, prime system."""
-    channels = _states(model)
-    odd = ("v", "r", "p", "phi", "q", "delta")
-    mirrored = channels | {name: -channels[name] for name in odd}
-    length = model.particulars["length"]
-    units = dict.fromkeys(ANGULAR, length) | {"q": length * model.travel_time}
-    ours = _accelerations(model, channels)
-    theirs = _accelerations(model, mirrored)
-    sizes, differences = [], []
-    for name, values in ours.items():
-        unit = units.get(name, 1.0)  # prime, but for what all have
-        image = -theirs[name] if name in odd else theirs[name]
-        sizes.append(unit * values)
-        differences.append(unit * (values - image))
-    size = _root_mean_square(np.array(sizes))
-    return 0.0 if size == 0.0 else 0.5 * _root_mean_square(np.array(differences)) / size
-
-
-def _root_mean_square(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _run(model: ShipModel, rudder: float, lengths: float) -> Trial:
@@ -214,13 +157,7 @@ def _steers(model: ShipModel) -> bool:
     )
 
 
-def _unusual(model: ShipModel, asymmetry: float) -> Iterator[str]:
-    if asymmetry > 0.1:
-        yield (
-            f"port and starboard differ by {100.0 * asymmetry:.0f} % of the"
-            " accelerations: more than the propeller of a single-screw ship explains;"
-            " identify from trials that begin to both sides"
-        )
+def _unusual(model: ShipModel) -> Iterator[str]:
     if not _steers(model):
         yield "no rudder turns this model: an autopilot has nothing to do on it"
     try:

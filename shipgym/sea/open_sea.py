@@ -170,7 +170,7 @@ def accelerations(angle: FromBow, size: float, series: Response) -> Acceleration
     if HAS_ROLL:
         roll = size * sum_of_sines(cosine, sine, series.roll)
     return Accelerations(
-        surge=size * sum_of_cosines(cosine, series.surge),
+        surge=size * sum_of_cosines(cosine, sine, series.surge),
         sway=size * sum_of_sines(cosine, sine, series.sway),
         yaw=size * sum_of_sines(cosine, sine, series.yaw),
         roll=roll,
@@ -181,7 +181,7 @@ def by_wave_slope(waves: FromBow, sea: Sea, p: SeaParameters) -> float:
     """Acceleration in roll by the slope of the waves that the ship meets, rad/s2."""
     if not HAS_ROLL:
         return 0.0
-    variance = sum_of_cosines(waves.cosine, p.roll_variance)
+    variance = sum_of_cosines(waves.cosine, waves.sine, p.roll_variance)
     return sqrt(max(variance, 0.0)) * sea.roll_velocity
 
 
@@ -223,7 +223,7 @@ def first_order_motion(
     part of it that swings, -w times the displacement: of variance w^2 and a quarter of
     a period ahead, as in waves of one frequency.
     """
-    variance = sum_of_cosines(waves.cosine, p.heading_variance)
+    variance = sum_of_cosines(waves.cosine, waves.sine, p.heading_variance)
     yaw = sqrt(max(variance, 0.0))
     return FirstOrderMotion(
         psi=yaw * heading.velocity,

@@ -1,6 +1,9 @@
 """Sums of short Fourier series over an angle, by its cosine and sine alone."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from shipgym.engine.record_code import written
 
 
 class Sines(NamedTuple):
@@ -26,40 +29,22 @@ class Cosines(NamedTuple):
     sixth: float
 
 
-def sum_of_sines(cosine: float, sine: float, a: Sines) -> float:
-    """Sum of amplitudes times sin(k angle), k from 1 to 6, by Chebyshev's recurrence.
+def _series(record: type[Any], beginning: str) -> Callable[..., float]:
+    """Write the sum of a series by Chebyshev's recurrence.
 
-    sin((k + 1) angle) = 2 cos(angle) sin(k angle) - sin((k - 1) angle).
+    cos((k + 1) angle) = 2 cos(angle) cos(k angle) - cos((k - 1) angle), and sines
+    likewise; `beginning` says what k = 0 and k = 1 have.
     """
-    d = 2.0 * cosine
-    s2 = d * sine
-    s3 = d * s2 - sine
-    s4 = d * s3 - s2
-    s5 = d * s4 - s3
-    s6 = d * s5 - s4
-    return (
-        a.first * sine
-        + a.second * s2
-        + a.third * s3
-        + a.fourth * s4
-        + a.fifth * s5
-        + a.sixth * s6
+    lines = ["d = 2.0 * cosine", f"h0, h1 = {beginning}"]
+    lines += [f"h{k + 1} = d * h{k} - h{k - 1}" for k in range(1, 6)]
+    first = 7 - len(record._fields)  # no mean of sines
+    sums = [f"a.{name} * h{k}" for k, name in enumerate(record._fields, first)]
+    name = record.__name__
+    return written(
+        f"sum_of_{name}", "cosine, sine, a", [*lines, f"return {' + '.join(sums)}"], {}
     )
 
 
-def sum_of_cosines(cosine: float, a: Cosines) -> float:
-    """Mean and sum of amplitudes times cos(k angle), k from 1 to 6, likewise."""
-    d = 2.0 * cosine
-    c2 = d * cosine - 1.0
-    c3 = d * c2 - cosine
-    c4 = d * c3 - c2
-    c5 = d * c4 - c3
-    c6 = d * c5 - c4
-    return a.mean + (
-        a.first * cosine
-        + a.second * c2
-        + a.third * c3
-        + a.fourth * c4
-        + a.fifth * c5
-        + a.sixth * c6
-    )
+#: (cosine, sine, amplitudes): the sum over the harmonics of an angle.
+sum_of_sines = _series(Sines, "0.0, sine")
+sum_of_cosines = _series(Cosines, "1.0, cosine")

@@ -27,13 +27,14 @@ ADDED_MASSES = ("X_udot", "Y_vdot", "Y_rdot", "N_vdot", "N_rdot")
 
 @dataclass(frozen=True)
 class ParticularLimits:
-    """Limits of one value, and how it changes from a ship to a similar one."""
+    """Limits of one value."""
 
     above: float | None = None
     below: float | None = None
     hint: str = ""  # unit or meaning, for messages
-    growth: float = 0.0  # power of the length with which the value grows
-    share: float | None = None  # largest part of that power of the length
+    # largest part of the length, of an area of the length squared
+    share: float | None = None
+    is_area: bool = False
 
 
 _IN_PRIME_SYSTEM = (
@@ -44,33 +45,33 @@ _ADDED_MASS = ParticularLimits(-1.0, 0.0, _IN_PRIME_SYSTEM)
 _COUPLING = ParticularLimits(-1.0, 1.0, _IN_PRIME_SYSTEM)
 
 
-def _size(growth: float, share: float | None = None) -> ParticularLimits:
-    """Limits of a value above 0 that grows with a power of the length."""
-    return ParticularLimits(above=0.0, growth=growth, share=share)
+def _size(share: float | None = None, is_area: bool = False) -> ParticularLimits:
+    """Limits of a value above 0."""
+    return ParticularLimits(above=0.0, share=share, is_area=is_area)
 
 
 LIMITS = {
     "length": ParticularLimits(0.01, 2000.0, "between perpendiculars, in m"),
-    "beam": _size(1.0, 1.0),
-    "draught": _size(1.0, 0.5),
-    "mass": ParticularLimits(above=0.0),
-    "xg": ParticularLimits(growth=1.0, share=0.5),
-    "yaw_gyradius": _size(1.0, 0.7),
+    "beam": _size(1.0),
+    "draught": _size(0.5),
+    "mass": _size(),
+    "xg": ParticularLimits(share=0.5),
+    "yaw_gyradius": _size(0.7),
     "block_coefficient": ParticularLimits(0.0, 1.0),
     "speed": ParticularLimits(0.0, 50.0, "in m/s; a knot is 0.514 m/s"),
-    "rudder_area": _size(2.0),
-    "propeller_diameter": _size(1.0, 0.5),
+    "rudder_area": _size(),
+    "propeller_diameter": _size(0.5),
     "rudder_aspect_ratio": ParticularLimits(0.0, 10.0),
     "propeller_pitch_ratio": ParticularLimits(0.0, 3.0),
     "rudders": ParticularLimits(0.0, 9.0),
     "propellers": ParticularLimits(0.0, 9.0),
-    "length_overall": _size(1.0, 2.0),
-    "frontal_area": _size(2.0, 0.5),
-    "lateral_area": _size(2.0, 0.5),
-    "lateral_centroid": ParticularLimits(growth=1.0, share=0.5),
-    "lateral_centroid_height": _size(1.0, 0.5),
-    "metacentric_height": _size(1.0, 0.2),
-    "roll_period": ParticularLimits(0.0, 200.0, growth=0.5),
+    "length_overall": _size(),
+    "frontal_area": _size(0.5, is_area=True),
+    "lateral_area": _size(0.5, is_area=True),
+    "lateral_centroid": ParticularLimits(share=0.5),
+    "lateral_centroid_height": _size(0.5),
+    "metacentric_height": _size(0.2),
+    "roll_period": ParticularLimits(0.0, 200.0),
     "water_density": ParticularLimits(
         500.0, 1500.0, "in kg/m3; fresh water has 1000, sea water 1025"
     ),
@@ -427,11 +428,10 @@ def check_together(values: Mapping[str, float]) -> None:
         limits = LIMITS[name]
         if limits.share is None:
             continue
-        largest = limits.share * length**limits.growth
+        largest = limits.share * length * (length if limits.is_area else 1.0)
         if abs(value) > largest:
-            is_area = limits.growth == 2.0
-            squared = " squared" if is_area else ""
-            unit = "m2" if is_area else "m"
+            squared = " squared" if limits.is_area else ""
+            unit = "m2" if limits.is_area else "m"
             raise InputError(
                 f"{name}: expected at most {limits.share:g} of the length{squared}, got"
                 f" {value:g} with length {length:g}; check the units ({unit})"
