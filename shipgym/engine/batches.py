@@ -9,9 +9,8 @@ from shipgym.engine.hooks import (
     load_ship,
     store_motion,
 )
-from shipgym.engine.motion import sail
 from shipgym.engine.records import LANES
-from shipgym.engine.trajectories import NO_LIMIT, push_of_wind, replaced, with_gear
+from shipgym.engine.trajectories import push_of_wind, replaced, sail_measured
 
 
 def sail_segment(
@@ -62,11 +61,10 @@ def sail_between(state: Any, ships: Any, offsets: Any, begin: Any, end: Any) -> 
     )
     for lane in range(LANES):
         own = load_ship(ships, lane)
-        ship = with_gear(own, NO_LIMIT, rate, 0.0)
         coefficients = load_coefficients(ships, lane)
         rudder = end[measured] + offsets[lane]
         motion = load_motion(state, lane)
-        motion = sail(motion, rudder, n, h, wind, coefficients, ship)
+        motion = sail_measured(motion, rudder, rate, n, h, wind, coefficients, own)
         motion = replaced(motion, motion.psi, rudder, motion.n)
         store_motion(state, lane, motion)
 

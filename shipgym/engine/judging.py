@@ -144,17 +144,24 @@ def past_interval(
     rules: Rules,
 ) -> Interval:
     """Return the interval that is over, with how far the ship is from known data."""
-    commands = load_commands(tile.state, lane)
     distance = envelope_distance(motion, data)
     extrapolating = outside_range(motion, data) | (distance > 1.0)
+    return interval_of(tile, lane, rules.dt, distance, pick(extrapolating, 1.0, 0.0))
+
+
+def interval_of(
+    tile: Tile, lane: int, dt: float, distance: float, extrapolating: float
+) -> Interval:
+    """Return the interval of a lane, with how far the ship is from known data."""
+    commands = load_commands(tile.state, lane)
     return Interval(
-        dt=rules.dt,
+        dt=dt,
         steps=load_counters(tile.state, lane).steps,
         rudder_before=commands.rudder_before,
         rudder_command=commands.rudder_command,
         shaft_command=commands.shaft_command,
         envelope_distance=distance,
-        extrapolating=pick(extrapolating, 1.0, 0.0),
+        extrapolating=extrapolating,
     )
 
 
@@ -280,17 +287,10 @@ def take_events(tile: Tile) -> None:
 
 def last_interval(tile: Tile, lane: int) -> Interval:
     """Return the interval of a lane as it was concluded; of a new episode zeros."""
-    commands = load_commands(tile.state, lane)
     outcome = load_outcome(tile.result, lane)
-    return Interval(
-        dt=load_rules(tile.settings).dt,
-        steps=load_counters(tile.state, lane).steps,
-        rudder_before=commands.rudder_before,
-        rudder_command=commands.rudder_command,
-        shaft_command=commands.shaft_command,
-        envelope_distance=outcome.envelope_distance,
-        extrapolating=outcome.extrapolating,
-    )
+    distance = outcome.envelope_distance
+    dt = load_rules(tile.settings).dt
+    return interval_of(tile, lane, dt, distance, outcome.extrapolating)
 
 
 @called

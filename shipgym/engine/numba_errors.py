@@ -42,10 +42,8 @@ def _reason(text: str) -> str:
     lines = [line for line in stripped if line and not line.startswith("Failed in")]
     reason = lines[0] if lines else "no reason given"
     missing, found, _ = reason.partition(" found for signature:")
-    if not found:
-        return reason
-    signatures = [line for line in lines if line.startswith(">>> ")]
-    return ": ".join([missing, *(line.removeprefix(">>> ") for line in signatures[:1])])
+    signature = next((line for line in lines if line.startswith(">>> ")), "")
+    return f"{missing}: {signature.removeprefix('>>> ')}" if found else reason
 
 
 def _place(text: str) -> str:

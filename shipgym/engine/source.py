@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from numbers import Real
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
@@ -106,16 +105,10 @@ def _check_record(record: Any, name: str, where: str) -> None:
             f"{where}: {name}: expected one number at least, got no annotated fields"
         )
 
-    numbers = (float, int, bool)
     for field, kind in kinds.items():
-        place = f"{where}: {name}.{field}"
-        default = record._field_defaults.get(field)
         may_be_list = name == "Settings" and field == list(kinds)[-1]
         if not (is_list(kind) and may_be_list) or get_origin(kind) is tuple:
-            _check_kind(kind, f"{name}.{field}", place)
-        is_wrong = kind in numbers and not isinstance(default, Real | None)
-        if is_wrong or isinstance(default, str):
-            raise unexpected(place, "a number, or a list as the last field", default)
+            _check_kind(kind, f"{name}.{field}", f"{where}: {name}.{field}")
     if name == "Settings":
         _check_defaults(record, where)
 

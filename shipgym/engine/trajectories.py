@@ -165,6 +165,20 @@ def push_of_wind(surge: float, sway: float, yaw: float) -> Push:
     return Push(surge, sway, yaw, 0.0, 0.0, 0.0)
 
 
+def sail_measured(
+    motion: Motion,
+    rudder: float,
+    rate: float,
+    shaft: float,
+    h: float,
+    wind: Push,
+    c: Any,
+    own: Ship,
+) -> Motion:
+    """State after a step with a rudder that moves at a measured rate to an angle."""
+    return sail(motion, rudder, shaft, h, wind, c, with_gear(own, NO_LIMIT, rate, 0.0))
+
+
 def open_loop(
     out: Any,
     t: Any,
@@ -191,13 +205,14 @@ def open_loop(
         steps = int(ceil(interval / longest_step - 1e-9))
         h = interval / steps
         rate = fabs(rudder - delta[i]) / interval
-        ship = with_gear(own, NO_LIMIT, rate, 0.0)
         pushed = push_of_wind(wind[i, 0], wind[i, 1], wind[i, 2])
 
         for k in range(steps):
             shaft = n[i] + change * (k + 0.5) / steps
-            motion = sail(motion, rudder, shaft, h, pushed, coefficients, ship)
-        if lost(motion, ship):
+            motion = sail_measured(
+                motion, rudder, rate, shaft, h, pushed, coefficients, own
+            )
+        if lost(motion, own):
             return i
         motion = replaced(motion, motion.psi, rudder, motion.n)
         store_motion(out[i + 1], 0, motion)

@@ -156,14 +156,6 @@ def checked_orders(model: ManoeuvringModel, commands: ArrayLike) -> Floats:
             f" with at least 2 steps, got {orders.shape}"
         )
     check_units(model, orders)
-    if "n" in names and not model.turns_astern:
-        row = int(orders[:, names.index("n")].argmin())
-        if orders[row, names.index("n")] < 0.0:
-            raise InputError(
-                f"commands: row {row}: expected a shaft speed >= 0, because the"
-                " equations hold for a shaft ahead only, got"
-                f" {orders[row, names.index('n')]:g}"
-            )
     return orders
 
 

@@ -347,7 +347,7 @@ def check_units(
         least = -most if model.turns_astern else 0.0
         _check_within(
             orders[:, names.index("n")],
-            -most,
+            least,
             most,
             f"a shaft speed in 1/s (not rpm) between {least:.4g} and {most:.4g},"
             f" {service:.4g} at service speed",

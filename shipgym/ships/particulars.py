@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import Any, NamedTuple, Self
 
@@ -25,62 +25,32 @@ from shipgym.errors import InputError
 ADDED_MASSES = ("X_udot", "Y_vdot", "Y_rdot", "N_vdot", "N_rdot")
 
 
-@dataclass(frozen=True)
-class ParticularLimits:
-    """Limits of one value."""
-
-    above: float | None = None
-    below: float | None = None
-    hint: str = ""  # unit or meaning, for messages
-    # largest part of the length, of an area of the length squared
-    share: float | None = None
-    is_area: bool = False
-
-
 _IN_PRIME_SYSTEM = (
     "in the prime system (mass by rho L^3 / 2), as a derivative: Y_vdot is minus the"
     " added mass"
 )
-_ADDED_MASS = ParticularLimits(-1.0, 0.0, _IN_PRIME_SYSTEM)
-_COUPLING = ParticularLimits(-1.0, 1.0, _IN_PRIME_SYSTEM)
 
 
-def _size(share: float | None = None, is_area: bool = False) -> ParticularLimits:
-    """Limits of a value above 0."""
-    return ParticularLimits(above=0.0, share=share, is_area=is_area)
+def _known(share: float | None = None, is_area: bool = False, **bounds: Any) -> Any:
+    """Field of a value that may be unknown, within bounds (`check_number`).
+
+    `share`: the largest part of the length, of an area of the length squared.
+    """
+    limits = {"bounds": bounds, "share": share, "is_area": is_area}
+    return field(default=None, metadata=limits)
 
 
-LIMITS = {
-    "length": ParticularLimits(0.01, 2000.0, "between perpendiculars, in m"),
-    "beam": _size(1.0),
-    "draught": _size(0.5),
-    "mass": _size(),
-    "xg": ParticularLimits(share=0.5),
-    "yaw_gyradius": _size(0.7),
-    "block_coefficient": ParticularLimits(0.0, 1.0),
-    "speed": ParticularLimits(0.0, 50.0, "in m/s; a knot is 0.514 m/s"),
-    "rudder_area": _size(),
-    "propeller_diameter": _size(0.5),
-    "rudder_aspect_ratio": ParticularLimits(0.0, 10.0),
-    "propeller_pitch_ratio": ParticularLimits(0.0, 3.0),
-    "rudders": ParticularLimits(0.0, 9.0),
-    "propellers": ParticularLimits(0.0, 9.0),
-    "length_overall": _size(),
-    "frontal_area": _size(0.5, is_area=True),
-    "lateral_area": _size(0.5, is_area=True),
-    "lateral_centroid": ParticularLimits(share=0.5),
-    "lateral_centroid_height": _size(0.5),
-    "metacentric_height": _size(0.2),
-    "roll_period": ParticularLimits(0.0, 200.0),
-    "water_density": ParticularLimits(
-        500.0, 1500.0, "in kg/m3; fresh water has 1000, sea water 1025"
-    ),
-    "X_udot": _ADDED_MASS,
-    "Y_vdot": _ADDED_MASS,
-    "Y_rdot": _COUPLING,
-    "N_vdot": _COUPLING,
-    "N_rdot": _ADDED_MASS,
-}
+def _size(share: float | None = None, is_area: bool = False) -> Any:
+    """Field of a value above 0."""
+    return _known(share, is_area, above=0.0)
+
+
+def _added_mass(below: float) -> Any:
+    """Field of a derivative by an acceleration."""
+    return _known(above=-1.0, below=below, hint=_IN_PRIME_SYSTEM)
+
+
+_LENGTH = {"above": 0.01, "below": 2000.0, "hint": "between perpendiculars, in m"}
 
 
 @dataclass(frozen=True)
@@ -125,34 +95,38 @@ class Particulars(Mapping[str, Any]):
         Names of the values that were estimated.
     """
 
-    length: float
+    length: float = field(metadata={"bounds": _LENGTH, "share": None})
     name: str = "ship"
-    beam: float | None = None
-    draught: float | None = None
-    mass: float | None = None
-    xg: float | None = None
-    yaw_gyradius: float | None = None
-    block_coefficient: float | None = None
-    speed: float | None = None
-    rudder_area: float | None = None
-    propeller_diameter: float | None = None
-    rudder_aspect_ratio: float | None = None
-    propeller_pitch_ratio: float | None = None
-    rudders: float | None = None
-    propellers: float | None = None
-    length_overall: float | None = None
-    frontal_area: float | None = None
-    lateral_area: float | None = None
-    lateral_centroid: float | None = None
-    lateral_centroid_height: float | None = None
-    metacentric_height: float | None = None
-    roll_period: float | None = None
-    water_density: float | None = None
-    X_udot: float | None = None
-    Y_vdot: float | None = None
-    Y_rdot: float | None = None
-    N_vdot: float | None = None
-    N_rdot: float | None = None
+    beam: float | None = _size(1.0)
+    draught: float | None = _size(0.5)
+    mass: float | None = _size()
+    xg: float | None = _known(0.5)
+    yaw_gyradius: float | None = _size(0.7)
+    block_coefficient: float | None = _known(above=0.0, below=1.0)
+    speed: float | None = _known(
+        above=0.0, below=50.0, hint="in m/s; a knot is 0.514 m/s"
+    )
+    rudder_area: float | None = _size()
+    propeller_diameter: float | None = _size(0.5)
+    rudder_aspect_ratio: float | None = _known(above=0.0, below=10.0)
+    propeller_pitch_ratio: float | None = _known(above=0.0, below=3.0)
+    rudders: float | None = _known(above=0.0, below=9.0)
+    propellers: float | None = _known(above=0.0, below=9.0)
+    length_overall: float | None = _size(2.0)
+    frontal_area: float | None = _size(0.5, is_area=True)
+    lateral_area: float | None = _size(0.5, is_area=True)
+    lateral_centroid: float | None = _known(0.5)
+    lateral_centroid_height: float | None = _size(0.5)
+    metacentric_height: float | None = _size(0.2)
+    roll_period: float | None = _known(above=0.0, below=200.0)
+    water_density: float | None = _known(
+        above=500.0, below=1500.0, hint="in kg/m3; fresh water has 1000, sea water 1025"
+    )
+    X_udot: float | None = _added_mass(0.0)
+    Y_vdot: float | None = _added_mass(0.0)
+    Y_rdot: float | None = _added_mass(1.0)
+    N_vdot: float | None = _added_mass(1.0)
+    N_rdot: float | None = _added_mass(0.0)
     estimated: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
@@ -273,6 +247,9 @@ class Particulars(Mapping[str, Any]):
 NAMES: tuple[str, ...] = tuple(
     item.name for item in fields(Particulars) if item.name != "estimated"
 )
+
+#: Limits of the numbers.
+LIMITS = {item.name: item.metadata for item in fields(Particulars) if item.metadata}
 
 Estimates = Mapping[str, Callable[[Particulars], float | None]]
 
@@ -410,15 +387,8 @@ _ESTIMATES: Estimates = {  # in this order
 
 def check_value(name: str, value: Any) -> float:
     """Return one value as float; InputError, naming it, for what no ship has."""
-    limits = LIMITS[name]
     place = f"added_mass {name}" if name in ADDED_MASSES else name
-    return check_number(
-        value,
-        place,
-        above=limits.above,
-        below=limits.below,
-        hint=limits.hint,
-    )
+    return check_number(value, place, **LIMITS[name]["bounds"])
 
 
 def check_together(values: Mapping[str, float]) -> None:
@@ -426,14 +396,16 @@ def check_together(values: Mapping[str, float]) -> None:
     length = values["length"]
     for name, value in values.items():
         limits = LIMITS[name]
-        if limits.share is None:
+        share = limits["share"]
+        if share is None:
             continue
-        largest = limits.share * length * (length if limits.is_area else 1.0)
+        is_area = limits["is_area"]
+        largest = share * length * (length if is_area else 1.0)
         if abs(value) > largest:
-            squared = " squared" if limits.is_area else ""
-            unit = "m2" if limits.is_area else "m"
+            squared = " squared" if is_area else ""
+            unit = "m2" if is_area else "m"
             raise InputError(
-                f"{name}: expected at most {limits.share:g} of the length{squared}, got"
+                f"{name}: expected at most {share:g} of the length{squared}, got"
                 f" {value:g} with length {length:g}; check the units ({unit})"
             )
     if "mass" in values:

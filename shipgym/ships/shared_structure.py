@@ -126,14 +126,18 @@ class SharedStructure(Structure):
         self, axis: str, coefficients: Mapping[str, float], p: Particulars
     ) -> Floats:
         """Coefficient of each term of a force, that of the ship's mass included."""
-        products = [term.product for term in self.terms(axis)]
-        force = dict.fromkeys(products, 0.0)
+        force = {term.product: 0.0 for term in self.terms(axis)}
         for share in self.shares[axis]:
             if share.acceleration is None:
                 value = coefficients[share.coefficient]
                 force[share.term.product] += share.sign * value
-        for term, mass in _centripetal(axis, p).items():
-            force[term.product] += mass
+        m = p.mass_prime
+        m_xG = m * p.xg_prime
+        if axis == "u":
+            force[VR.product] += m
+            force[RR.product] += m_xG
+        else:
+            force[UR.product] -= m if axis == "v" else m_xG
         return np.array(list(force.values()))
 
     def acceleration_matrix(
@@ -161,20 +165,7 @@ class SharedStructure(Structure):
         given = check_table(table["shares"], place, allowed=AXES, required=AXES)
         texts = {axis: check_text(given[axis], f"{place}.{axis}") for axis in AXES}
         with placed(place):
-            fields = _fields(table.get("name"), table.get("source"), texts)
-        return cls(**fields)
-
-
-def _centripetal(axis: str, p: Particulars) -> dict[Term, float]:
-    """Terms of the ship's own mass in a force, prime system."""
-    m = p.mass_prime
-    m_xG = m * p.xg_prime
-    terms = {
-        "u": {VR: m, RR: m_xG},
-        "v": {UR: -m},
-        "r": {UR: -m_xG},
-    }
-    return terms[axis]
+            return cls(**_fields(table.get("name"), table.get("source"), texts))
 
 
 def shared_structure(
@@ -186,22 +177,12 @@ def shared_structure(
 
 def _fields(name: Any, source: Any, texts: Mapping[str, str]) -> dict[str, Any]:
     """Fields of a `SharedStructure`: its equations follow from the shares."""
-    on_velocities: dict[str, list[Term]] = {}
-    for axis in AXES:
-        on_velocities[axis] = []
-        allowed = ("udot",) if axis == "u" else ("vdot", "rdot")
-        for share in read_shares(texts[axis]):
-            if share.acceleration is None:
-                on_velocities[axis].append(share.term)
-            elif share.acceleration not in allowed:
-                raise InputError(
-                    f"{axis}: expected 'udot' in the equation of surge, 'vdot' and"
-                    f" 'rdot' in those of sway and yaw, got '{share.acceleration}'"
-                )
-    ahead = on_velocities["u"]
-    aside = on_velocities["v"] + on_velocities["r"]
+    ahead, sway, yaw = (
+        [share.term for share in read_shares(texts[axis]) if not share.acceleration]
+        for axis in AXES
+    )
     surge = _distinct([*ahead, VR, RR])
-    across = _distinct([*aside, UR])
+    across = _distinct([*sway, *yaw, UR])
     return {
         "name": name,
         "source": source,

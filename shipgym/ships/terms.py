@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -196,14 +196,9 @@ def short_terms(words: str, surge: str = "du") -> tuple[Term, ...]:
 
 
 def read_term_list(content: Any, where: str) -> tuple[Term, ...]:
-    """Read the terms of one equation from a model file."""
-    entries = list_entries(content, where)
-    terms = [Term.from_dict(entry, place) for place, entry in entries.items()]
-    return tuple(terms)
-
-
-def list_entries(content: Any, where: str) -> Mapping[str, Any]:
-    """Entries of a list in a model file, 1 to `MOST_TERMS`, each with its place."""
+    """Read the terms of one equation from a model file, 1 to `MOST_TERMS`."""
     if not isinstance(content, list) or not 1 <= len(content) <= MOST_TERMS:
         raise unexpected(where, f"a list of 1 to {MOST_TERMS} entries", content)
-    return {f"{where}[{i}]": entry for i, entry in enumerate(content)}
+    return tuple(
+        Term.from_dict(entry, f"{where}[{i}]") for i, entry in enumerate(content)
+    )

@@ -31,7 +31,7 @@ pytestmark = pytest.mark.interpreted
             "container",
             0.1,
             -0.5,
-            "a shaft speed >= 0, .* a shaft ahead only, got -0.5",
+            r"a shaft speed in 1/s \(not rpm\) between 0 and .* got -0.5",
         ),
         (
             "kvlcc2",
