@@ -122,7 +122,7 @@ def advise_command(
 ) -> None:
     """Show what the trials determine and what to run next.
 
-    Prints by how much zigzags, turning circles and binary rudder sequences, simulated
+    Prints by how much zigzags and turning circles, simulated
     on the model identified so far, would each reduce the error of a coefficient.
     """
     from agents.cli.terminal import answer, identifying, say

@@ -20,7 +20,7 @@ from identification.text import as_text, lined_table
 from shipgym import InputError, ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice
-from shipgym.manoeuvres import prbs_rudder, turning_circle, zigzag
+from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.models.by_name import takes_name
 from shipgym.ships import Structure
 from shipgym.trials.resampling import usual_step
@@ -92,8 +92,8 @@ def _descending(values: Mapping[str, float]) -> list[str]:
 def standard_candidates(model: ShipModel) -> dict[str, Candidate]:
     """Manoeuvres that trials usually consist of, each of 40 ship lengths.
 
-    Zigzags and turning circles of several angles, up to the rudder's limit, and a
-    pseudo-random binary rudder; lengths at service speed.
+    Zigzags and turning circles of several angles, up to the rudder's limit; lengths at
+    service speed.
     """
     travel = model.travel_time
     times: dict[str, Any] = {"duration": 40.0 * travel, "dt": travel / 60}
@@ -111,9 +111,6 @@ def standard_candidates(model: ShipModel) -> dict[str, Candidate]:
             f"zigzag {angle:g}/{angle:g}": partial(zigzag, **both, **times),
             f"turning circle {angle:g}": partial(
                 turning_circle, rudder_deg=angle, **times
-            ),
-            f"binary rudder {angle:g}": partial(
-                prbs_rudder, amplitude_deg=angle, **times
             ),
         }
     return found

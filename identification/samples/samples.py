@@ -260,6 +260,7 @@ class _Regression:
     @cached_property
     def _bare_reference(self) -> ShipModel:
         """Reference ship of a grey box, converted to the target."""
+        assert isinstance(self.structure, GreyBox)
         gear = self.gear or SteeringGear()
         return converted_model(self.structure, self.particulars, gear, self.shaft_speed)
 

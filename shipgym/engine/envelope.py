@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import NamedTuple
 
-from shipgym.engine.motion import Motion
+from shipgym.engine.record_code import written
 
 
 class Four(NamedTuple):
@@ -39,36 +39,27 @@ class Envelope(NamedTuple):
     shape: Triangle
 
 
-def envelope_distance(motion: Motion, data: Envelope) -> float:
-    """Size of the ellipsoid through the state relative to the one around the data."""
-    centre = data.centre
-    u = motion.u - centre.u
-    v = motion.v - centre.v
-    r = motion.r - centre.r
-    delta = motion.delta - centre.delta
-
-    w = data.shape
-    first = w.uu * u + w.uv * v + w.ur * r + w.ud * delta
-    second = w.vv * v + w.vr * r + w.vd * delta
-    third = w.rr * r + w.rd * delta
-    fourth = w.dd * delta
-    square = first * first + second * second + third * third + fourth * fourth
-    return sqrt(square)
+def _distance() -> list[str]:
+    """Lines of `envelope_distance`: |W (z - centre)|."""
+    names = Four._fields
+    lines = [f"{name} = motion.{name} - data.centre.{name}" for name in names]
+    squares = []
+    for k, row in enumerate(names):
+        terms = [f"data.shape.{row[0]}{by[0]} * {by}" for by in names[k:]]
+        lines.append(f"w{k} = {' + '.join(terms)}")
+        squares.append(f"w{k} * w{k}")
+    return [*lines, f"return sqrt({' + '.join(squares)})"]
 
 
-def outside_range(motion: Motion, data: Envelope) -> bool:
-    """Return whether u, v, r or delta is outside its range in the data."""
-    low, high = data.low, data.high
-    below = (
-        (motion.u < low.u)
-        | (motion.v < low.v)
-        | (motion.r < low.r)
-        | (motion.delta < low.delta)
-    )
-    above = (
-        (motion.u > high.u)
-        | (motion.v > high.v)
-        | (motion.r > high.r)
-        | (motion.delta > high.delta)
-    )
-    return below | above
+def _outside() -> list[str]:
+    """Lines of `outside_range`."""
+    beyond = "(motion.{0} < data.low.{0}) | (motion.{0} > data.high.{0})"
+    return [f"return {' | '.join(beyond.format(name) for name in Four._fields)}"]
+
+
+#: (motion, data): the size of the ellipsoid through the state by that around the data.
+envelope_distance = written(
+    "envelope_distance", "motion, data", _distance(), {"sqrt": sqrt}
+)
+#: (motion, data): whether u, v, r or delta is outside its range in the data.
+outside_range = written("outside_range", "motion, data", _outside(), {})

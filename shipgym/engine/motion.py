@@ -75,22 +75,8 @@ class Held(NamedTuple):
     push: Push
 
 
-class Rates(NamedTuple):
-    """Time derivative of a state; of x and y in the frame in which psi is small."""
-
-    x: float
-    y: float
-    psi: float
-    u: float
-    v: float
-    r: float
-    p: float
-    phi: float
-    q: float
-    delta: float
-    n: float
-
-
+#: Time derivative of a state; of x and y in the frame in which psi is small.
+Rates = Motion
 NO_RATES: Rates = zeros(Rates)()
 
 

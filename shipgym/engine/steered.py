@@ -5,10 +5,10 @@ Arguments and rows are those of `shipgym.engine.trajectories`.
 
 from typing import Any
 
-from shipgym.engine.hooks import load_coefficients, load_motion, load_ship, store_motion
+from shipgym.engine.hooks import load_coefficients, load_motion, load_ship
 from shipgym.engine.motion import Motion, Push, Ship, lost, sail
 from shipgym.engine.specialise import called
-from shipgym.engine.trajectories import follow, push_now, replaced
+from shipgym.engine.trajectories import follow, push_now
 
 
 @called
@@ -74,15 +74,14 @@ def zigzag(
 ) -> tuple[int, int]:
     """Steer a zigzag; `commands` receives the rudder angle held from each sample on.
 
-    The first order is `angle`; the rudder reverses when the heading has moved by
-    `threshold` to the side of the order, at that instant (`inside_step`) or at the next
-    sample. The second number returned counts the reversals.
+    She starts with a heading of 0. The first order is `angle`; the rudder reverses when
+    the heading has moved by `threshold` to the side of the order, at that instant
+    (`inside_step`) or at the next sample. The second number returned counts the
+    reversals.
     """
     ship = load_ship(numbers)
     coefficients = load_coefficients(numbers)
     motion = load_motion(out[0])
-    first_heading = motion.psi
-    motion = replaced(motion, 0.0, motion.delta, motion.n)  # headings from the first
     command = angle
     reversals = 0
     last = len(out) - 1
@@ -106,9 +105,4 @@ def zigzag(
 
     for i in range(last, len(commands)):
         commands[i] = command
-    for i in range(1, last + 1):
-        motion = load_motion(out[i])
-        heading = first_heading + motion.psi
-        motion = replaced(motion, heading, motion.delta, motion.n)
-        store_motion(out[i], 0, motion)
     return last, reversals

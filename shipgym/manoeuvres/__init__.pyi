@@ -1,5 +1,4 @@
 from .criteria import Criterion as Criterion
-from .excitation import prbs_rudder as prbs_rudder
 from .imo import imo_assessment as imo_assessment
 from .intervals import IndexInterval as IndexInterval
 from .intervals import index_intervals as index_intervals

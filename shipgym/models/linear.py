@@ -18,6 +18,7 @@ from shipgym.models.ship_model import ShipModel
 #: Largest neutral rudder, rad: beyond, a model is not that of a ship.
 LARGEST_RUDDER = np.radians(20.0)
 # unknowns of a balance, and the rate that each brings to 0
+OTHERS = ("phi", "n", "q")
 BALANCED_BY = {"u": "u", "v": "v", "delta": "r", "phi": "p", "q": "q", "n": "n"}
 
 
@@ -93,7 +94,7 @@ def straight_running(model: ShipModel) -> StraightRunning:
             " identify it from trials that turn to both sides, or check the sign of the"
             " rudder"
         )
-    others = {name: found[name] for name in ("phi", "n", "q") if name in found}
+    others = {name: value for name, value in found.items() if name in OTHERS}
     return StraightRunning(found["u"], found["v"], found["delta"], others)
 
 

@@ -18,6 +18,7 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_flag
 from shipgym.engine.compiled_ship import CompiledShip, compiled_ship
 from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.record_code import changer
 from shipgym.engine.records import Record
 from shipgym.errors import InputError
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
@@ -193,6 +194,7 @@ class GreyBox(Structure):
         return cls(**fields, reference=reference, shaft=shaft)
 
 
+moving = changer(Motion, "u", "v", "r", "p", "q", "n")
 KNOWS_SHAFT = False  # whether the reference ship's shaft turns with the target's
 
 
@@ -213,18 +215,14 @@ def accelerations(
     n = c.known.shaft
     if KNOWS_SHAFT:
         n = motion.n * (c.known.shaft / ship.shaft)
-    at = Motion(
-        x=0.0,
-        y=0.0,
-        psi=0.0,
-        u=fast * motion.u,
-        v=fast * motion.v,
-        r=quick * motion.r,
-        p=quick * motion.p,
-        phi=motion.phi,
-        q=quick * quick * motion.q,
-        delta=motion.delta,
-        n=n,
+    at = moving(
+        motion,
+        fast * motion.u,
+        fast * motion.v,
+        quick * motion.r,
+        quick * motion.p,
+        quick * quick * motion.q,
+        n,
     )
     surge, sway, yaw, roll, memory = reference_accelerations(at, c.reference, c.known)
     udot, vdot, rdot, _, _ = term_accelerations(motion, c.terms, ship)
