@@ -20,7 +20,6 @@ from .sea.conditions import Current as Current
 from .sea.conditions import Waves as Waves
 from .sea.conditions import Weather as Weather
 from .sea.conditions import Wind as Wind
-from .sea.conditions import sea_states as sea_states
 from .ships import ShipEquations as ShipEquations
 from .ships import list_structures as list_structures
 from .ships import register_structure as register_structure

@@ -15,7 +15,7 @@ from identification.samples.prediction import with_start
 from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.manoeuvres.execution import reversals, rudder
-from shipgym.models.simulate import Conditions, Passage, checked_orders
+from shipgym.models.simulate import Passage, checked_orders
 from shipgym.ships.manoeuvring_model import two_commands
 
 
@@ -39,7 +39,7 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
         return None
     begun = with_start(model, trial)
     start = [begun[name][0] if name in begun else 0.0 for name in names]
-    passage = Passage(model, Conditions(), 0.02 * model.travel_time)
+    passage = Passage(model, 0.02 * model.travel_time)
     times, states, orders = [trial.t[:1]], [np.array([start])], [np.zeros(0)]
     try:
         for leg in legs(trial):

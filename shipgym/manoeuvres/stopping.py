@@ -12,7 +12,7 @@ from shipgym.manoeuvres.execution import distance_sailed, require, ship_length
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.models import ShipModel
 from shipgym.models.by_name import takes_name
-from shipgym.models.simulate import Conditions, Passage, as_trial, orders
+from shipgym.models.simulate import Passage, as_trial, orders
 from shipgym.ships import ShipEquations
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
@@ -63,7 +63,7 @@ def stopping(
     step = model.travel_time / n_steps
     target = speed_ratio * model.particulars["speed"]
 
-    passage = Passage(model, Conditions(water_depth), step)
+    passage = Passage(model, step, water_depth)
     held = np.tile([0.0, order], (n_steps, 1))
     column = model.state_names.index("u")
     states = passage.states(model.service_state, 0)

@@ -22,7 +22,7 @@ from shipgym.manoeuvres.execution import (
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.models.by_name import takes_name
 from shipgym.models.ship_model import ShipModel
-from shipgym.models.simulate import Conditions, Passage, Seed, as_trial, orders
+from shipgym.models.simulate import Passage, Seed, as_trial, orders
 from shipgym.sea.conditions import Weather
 from shipgym.trials.trial import Trial
 
@@ -92,7 +92,7 @@ def zigzag(
     check_choice(switch, ("inside", "step"), "switch")
     angle = np.radians(rudder_deg)
 
-    passage = Passage(model, Conditions(water_depth, weather, seed), dt)
+    passage = Passage(model, dt, water_depth, weather, seed)
     states = passage.states(model.service_state, n_steps)
     rudder = np.empty(n_steps + 1)
     _, n_reversals = passage.run(

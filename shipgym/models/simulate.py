@@ -1,6 +1,5 @@
 """Simulate ships as Trials, with given commands or those of a measured trial."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -30,16 +29,6 @@ WIND = {"u": "wind_udot", "v": "wind_vdot", "r": "wind_rdot"}  # channels, by eq
 Seed = int | np.random.Generator
 
 
-@dataclass(frozen=True)
-class Conditions:
-    """Depth of the water and weather of a simulation."""
-
-    water_depth: float = np.inf  # m
-    # a weather, the name of a sea state, or None for calm
-    weather: Weather | str | None = None
-    seed: Seed = 0  # of the random part of the weather
-
-
 class Passage:
     """One ship in given conditions: the loops for them and the arrays they work on.
 
@@ -49,19 +38,24 @@ class Passage:
     """
 
     def __init__(
-        self, model: ManoeuvringModel, conditions: Conditions, dt: float
+        self,
+        model: ManoeuvringModel,
+        dt: float,
+        water_depth: float = np.inf,
+        weather: Weather | str | None = None,
+        seed: Seed = 0,
     ) -> None:
         self.model = model
         self.compiled = model.compiled
         self.dt = dt
-        self.numbers = model.ship_numbers(conditions.water_depth, dt)
-        weather = as_weather(conditions.weather, "weather")
-        self.windy = not weather.calm
+        self.numbers = model.ship_numbers(water_depth, dt)
+        known = as_weather(weather, "weather")
+        self.windy = not known.calm
         self.sea = np.zeros(0), np.zeros(0, dtype=np.uint64), np.zeros(0)
         if self.windy:
             state = np.zeros(len(leaves(Sea)))
-            random = _random_word(conditions.seed)
-            parameters = weather_column(model, weather, dt, conditions.water_depth)
+            random = _random_word(seed)
+            parameters = weather_column(model, known, dt, water_depth)
             self.sea = state, random, parameters
 
     def loop(self, name: str) -> Any:
@@ -127,11 +121,7 @@ def simulate(
     """Simulate a ship with commands held over each step (see `ShipModel.simulate`)."""
     held = checked_orders(model, commands)
     check_number(dt, "dt", above=0.0, hint="in s")
-    passage = Passage(
-        model,
-        Conditions(water_depth, weather, seed),
-        dt,
-    )
+    passage = Passage(model, dt, water_depth, weather, seed)
     first = initial_state(model, state)
     states = passage.states(first, len(held))
     passage.run("simulate", states, two_commands(held), dt)

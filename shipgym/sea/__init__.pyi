@@ -1,9 +1,7 @@
 from .conditions import Current as Current
-from .conditions import SeaState as SeaState
 from .conditions import Waves as Waves
 from .conditions import Weather as Weather
 from .conditions import Wind as Wind
-from .conditions import sea_states as sea_states
 from .drift import wave_drift as wave_drift
 from .estimates import weather_particulars as weather_particulars
 from .harmonics import Curves as Curves

@@ -168,30 +168,15 @@ PARTS: dict[str, type[Any]] = {"current": Current, "wind": Wind, "waves": Waves}
 # ---- sea states ------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class SeaState:
-    """One row of the table of sea states."""
-
-    name: str  # in the words of WMO code table 3700
-    # Hs, m, and Tp, s, taken
-    significant_height: float
-    peak_period: float
-    wind_speed: float  # 10 m above the sea, m/s
-
-
-def sea_states() -> dict[str, SeaState]:
-    """Sea states by name, from calm to rough.
-
-    Heights, most probable modal periods and sustained winds: Bales 1983, Designing
-    ships to the natural environment, Naval Engineers Journal 95(2), open ocean North
-    Atlantic (also Lee & Bales, STANAG 4194).
-    """
-    return {
-        "calm": SeaState("calm", 0.0, 0.0, 0.0),
-        "slight": SeaState("slight", 0.88, 7.5, wind_at_10_m(13.5)),
-        "moderate": SeaState("moderate", 1.88, 8.8, wind_at_10_m(19.0)),
-        "rough": SeaState("rough", 3.25, 9.7, wind_at_10_m(24.5)),
-    }
+#: Hs, m, most probable modal period, s, and sustained wind at 19.5 m, knots, by the
+#: words of WMO code table 3700: Bales 1983, Designing ships to the natural environment,
+#: Naval Engineers Journal 95(2), open ocean North Atlantic (also Lee & Bales, STANAG
+#: 4194). "calm" has none of them.
+SEA_STATES = {
+    "slight": (0.88, 7.5, 13.5),
+    "moderate": (1.88, 8.8, 19.0),
+    "rough": (3.25, 9.7, 24.5),
+}
 
 
 def wind_at_10_m(knots: float) -> float:
@@ -249,18 +234,13 @@ class Weather:
             north-east; None: drawn for each episode of an environment.
         current : Current, optional
         """
-        states = sea_states()
         own = "; for another sea give Weather(wind=Wind(...), waves=Waves(...))"
-        state = states[check_choice(name, states, "sea state", own)]
-        if state.wind_speed == 0.0:
-            return cls(current=current, name=state.name)
-        waves = Waves(state.significant_height, state.peak_period, from_deg)
-        return cls(
-            current=current,
-            wind=Wind(state.wind_speed, from_deg),
-            waves=waves,
-            name=state.name,
-        )
+        check_choice(name, ("calm", *SEA_STATES), "sea state", own)
+        if name == "calm":
+            return cls(current=current, name=name)
+        height, period, knots = SEA_STATES[name]
+        wind = Wind(wind_at_10_m(knots), from_deg)
+        return cls(current, wind, Waves(height, period, from_deg), name)
 
     @property
     def calm(self) -> bool:

@@ -4,7 +4,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy import cos, exp, log, pi, sqrt, trapezoid, where
+from numpy import cos, exp, log, pi, trapezoid, where
 from numpy.fft import irfft, rfft
 from numpy.typing import ArrayLike
 
@@ -26,17 +26,14 @@ class WaveFilter(NamedTuple):
 
     peak_frequency: float  # w0 for a ship at rest, rad/s
     damping: float  # lambda, relative damping
-    gain: float  # rad^(1/2) / s^(1/2)
 
     def spectrum(self, omega: ArrayLike) -> Floats:
         """One-sided spectral density of the output per rad/s, whose integral is 1."""
         w = np.asarray(omega, dtype=float)
         w0 = self.peak_frequency
-        stiffness = w0**2 - w**2
-        damping = 2.0 * self.damping * w0 * w
-        amplitude = self.gain * w
-        response = amplitude**2 / (stiffness**2 + damping**2)
-        return response / pi
+        width = (2.0 * w0 * w) ** 2 * self.damping
+        response = width / ((w0**2 - w**2) ** 2 + self.damping * width)
+        return response / (pi * w0)
 
 
 def pierson_moskowitz(omega: ArrayLike, Hs: float, Tp: float) -> Floats:
@@ -130,7 +127,7 @@ def wave_filter(waves: Waves) -> WaveFilter:
     """
     peak = 2.0 * pi / waves.peak_period
     damping = _fitted_damping(waves.peak_enhancement)
-    return WaveFilter(peak, damping, gain=float(2.0 * sqrt(damping * peak)))
+    return WaveFilter(peak, damping)
 
 
 @lru_cache(maxsize=64)
@@ -141,8 +138,7 @@ def _fitted_damping(gamma: float) -> float:
     target = jonswap(w, 4.0, 2.0 * pi, gamma)
 
     def misfit(damping: float) -> float:
-        filtered = WaveFilter(1.0, damping, gain=2.0 * damping**0.5)
-        error = filtered.spectrum(w) - target
+        error = WaveFilter(1.0, damping).spectrum(w) - target
         return float(error @ error)
 
     fitted = minimize_scalar(misfit, bounds=(0.01, 1.0), method="bounded")
