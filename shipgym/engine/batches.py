@@ -64,7 +64,16 @@ def sail_between(state: Any, ships: Any, offsets: Any, begin: Any, end: Any) -> 
         coefficients = load_coefficients(ships, lane)
         rudder = end[measured] + offsets[lane]
         motion = load_motion(state, lane)
-        motion = sail_measured(motion, rudder, rate, n, h, wind, coefficients, own)
+        motion = sail_measured(
+            motion,
+            rudder,
+            rate,
+            n,
+            h,
+            wind,
+            coefficients,
+            own,
+        )
         motion = replaced(motion, motion.psi, rudder, motion.n)
         store_motion(state, lane, motion)
 

@@ -163,7 +163,12 @@ class EpisodeProgram:
     def _may_fail(self) -> bool:
         """Whether a function that each interval calls takes entries of arrays."""
         task = self.task
-        asked = (task.step, task.observe, task.due, task.worst_cost)
+        asked = (
+            task.step,
+            task.observe,
+            task.due,
+            task.worst_cost,
+        )
         sensors = (self.sensors.measure, self.sensors.readings)
         return any(takes_entries(one, {}) for one in (*asked, *sensors))
 

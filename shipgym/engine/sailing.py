@@ -138,6 +138,12 @@ def evolve_sea(tile: Tile, lane: int, motion: Motion, h: float, over: bool) -> N
     sea = load_sea(tile.state, lane)
     parameters = load_sea_parameters(tile.ships, lane)
     word = load_sea_random(tile.random, lane).rng_state
-    evolved = evolve(motion, h, sea, word, parameters)
+    evolved = evolve(
+        motion,
+        h,
+        sea,
+        word,
+        parameters,
+    )
     store_sea(tile.state, lane, pick(over, sea, evolved))
     store_sea_random(tile.random, lane, SeaRandom(word + EVOLVE_WORDS))

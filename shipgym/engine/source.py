@@ -232,7 +232,12 @@ def _setting_of(kind: Any, value: Any, name: str, bounds: Setting) -> Any:
         raise unexpected(name, expected, value)
 
     made = []
-    for label, (_, part), item in zip(labels, parts, value, strict=True):
+    for label, (_, part), item in zip(
+        labels,
+        parts,
+        value,
+        strict=True,
+    ):
         place = f"{name}: {label}"
         made.append(_setting_of(part, item, place, bounds))
     return kind(*made) if is_record(kind) else tuple(made)

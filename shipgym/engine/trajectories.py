@@ -214,6 +214,11 @@ def open_loop(
             )
         if lost(motion, own):
             return i
-        motion = replaced(motion, motion.psi, rudder, motion.n)
+        motion = replaced(
+            motion,
+            motion.psi,
+            rudder,
+            motion.n,
+        )
         store_motion(out[i + 1], 0, motion)
     return last

@@ -136,7 +136,11 @@ def _values(model: ShipModel, trial: Trial, rules: dict[str, Rule]) -> dict[str,
     indices: Any
     if trial.kind == "zigzag":
         _, _, heading_deg = next(iter(rules.values())).manoeuvre.rpartition("/")
-        indices = zigzag_indices(trial, length, float(heading_deg))
+        indices = zigzag_indices(
+            trial,
+            length,
+            float(heading_deg),
+        )
     else:
         indices = turning_indices(trial, length)
     values = {name: getattr(indices, rule.index) for name, rule in rules.items()}

@@ -42,7 +42,11 @@ def check_ship_model(model: ShipModel | str | Path) -> Findings:
         return Findings(name, tuple(problems))
     problems += _wrong_courses(model)
     problems += _wrong_rudder(model)
-    return Findings(name, tuple(problems), tuple(_unusual(model)))
+    return Findings(
+        name,
+        tuple(problems),
+        tuple(_unusual(model)),
+    )
 
 
 def _states(model: ShipModel) -> dict[str, Floats]:

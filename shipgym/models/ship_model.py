@@ -165,7 +165,11 @@ class ShipModel(ManoeuvringModel):
         """Read a model file; InputError, naming the file and the field at fault."""
         file = Path(path)
         remedy = "identify the model again or take another copy"
-        fields = read_json(file, "model file", remedy)
+        fields = read_json(
+            file,
+            "model file",
+            remedy,
+        )
         return cls.from_dict(fields, str(file))
 
     @classmethod

@@ -198,7 +198,15 @@ def open_loop_states(model: ManoeuvringModel, trial: Trial, starts: Floats) -> F
     found[:, 0] = starts
     longest_step = LONGEST_STEP * model.travel_time
     for states in found:
-        reached = loop(states, t, delta, n, mean_wind, longest_step, numbers)
+        reached = loop(
+            states,
+            t,
+            delta,
+            n,
+            mean_wind,
+            longest_step,
+            numbers,
+        )
         if reached < len(t) - 1:
             raise unstable(model, t[reached], states[reached])
     return found
@@ -297,7 +305,11 @@ def unstable(
         heel_deg = np.degrees(last["phi"])
         there += f", phi = {heel_deg:.3g} deg"
     reason = "it is unstable there"
-    if getattr(model.dynamics, "path", None):  # a user's own
+    if getattr(
+        model.dynamics,
+        "path",
+        None,
+    ):  # a user's own
         reason += ", or her equations give no number (check_ship_model says where)"
     return UnstableModelError(
         f"model {model.name!r} runs away after {time_s:.1f} s ({there}): {reason}",

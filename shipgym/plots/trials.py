@@ -20,7 +20,13 @@ def thinned(trial: Trial) -> slice:
 
 def history_figure(
     trials: Mapping[str, Trial],
-    channels: Sequence[str] = ("psi", "r", "u", "v", "delta"),
+    channels: Sequence[str] = (
+        "psi",
+        "r",
+        "u",
+        "v",
+        "delta",
+    ),
 ) -> Figure:
     """Plot time histories: a panel a channel, a line for each trial by its label.
 

@@ -58,7 +58,12 @@ def _radiated(omega: Floats, chi: Floats, hull: MainDimensions, U: float) -> Flo
     3859.2 B^2 / L CB^1.34 k_yy^2 a1 a2 w^b1 exp(b1 / d1 (1 - w^d1))
     """
     L, B, _, CB = hull
-    w = _reduced_frequency(omega, chi, hull, U)
+    w = _reduced_frequency(
+        omega,
+        chi,
+        hull,
+        U,
+    )
     a1, a2 = _amplitudes(omega, chi, hull, U)
 
     below_peak = w < 1.0
@@ -117,7 +122,11 @@ def _amplitudes(
     fuller = (0.87 / hull.CB) ** ((1.0 + Fr) * c)
     a1_ahead = fuller * (1.0 + 2.0 * c) / 3.0
     a2_ahead = speed_factor(Fr)
-    a1_astern, a2_astern = _amplitudes_astern(omega, hull, U)
+    a1_astern, a2_astern = _amplitudes_astern(
+        omega,
+        hull,
+        U,
+    )
 
     astern = np.clip(chi / (0.5 * pi) - 1.0, 0.0, 1.0)
     ahead = 1.0 - astern

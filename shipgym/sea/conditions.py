@@ -235,7 +235,12 @@ class Weather:
         current : Current, optional
         """
         own = "; for another sea give Weather(wind=Wind(...), waves=Waves(...))"
-        check_choice(name, ("calm", *SEA_STATES), "sea state", own)
+        check_choice(
+            name,
+            ("calm", *SEA_STATES),
+            "sea state",
+            own,
+        )
         if name == "calm":
             return cls(current=current, name=name)
         height, period, knots = SEA_STATES[name]
@@ -259,7 +264,11 @@ class Weather:
         InputError, beginning with `where`, for an unknown key, a missing value or one
         that no weather has.
         """
-        table = check_table(mapping, where, ("name", *PARTS))
+        table = check_table(
+            mapping,
+            where,
+            ("name", *PARTS),
+        )
         parts = {}
         for name, kind in PARTS.items():
             content = table.get(name)

@@ -80,7 +80,12 @@ def reflection_coefficients(chi: ArrayLike, ship: Particulars) -> tuple[Floats, 
     """
     L = ship.length
     x, half_breadth = waterline(ship)
-    Y_starboard, N_starboard = _reflected(chi, x, half_breadth, side=1.0)
+    Y_starboard, N_starboard = _reflected(
+        chi,
+        x,
+        half_breadth,
+        side=1.0,
+    )
     Y_port, N_port = _reflected(chi, x, half_breadth, side=-1.0)
     Y = Y_starboard + Y_port
     N = N_starboard + N_port

@@ -57,7 +57,14 @@ def accelerations(
     phi = motion.phi
 
     u_P, K_T_nn, T = propeller(motion.n * DIAMETER * per_U, u, v, r, c)
-    F_N, sin_delta, cos_delta = rudder_force(motion.delta, v, r, u_P, K_T_nn, c)
+    F_N, sin_delta, cos_delta = rudder_force(
+        motion.delta,
+        v,
+        r,
+        u_P,
+        K_T_nn,
+        c,
+    )
 
     # W' GM'
     weight = WEIGHT / (0.5 * L * L)

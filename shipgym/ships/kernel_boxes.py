@@ -288,7 +288,13 @@ def coordinates(motion: Motion, c: KernelCoefficients, ship: Ship) -> Point:
     rudder = c.per_delta * (motion.delta - c.delta)
     speed = c.per_speed * (U_ - c.speed)
     square = sway * sway + turn * turn + rudder * rudder + speed * speed
-    return Point(sway, turn, rudder, speed, half=0.5 * square)
+    return Point(
+        sway,
+        turn,
+        rudder,
+        speed,
+        half=0.5 * square,
+    )
 
 
 def add_centre(at: Point, sums: Sums, c: KernelCoefficients, number: int) -> Sums:

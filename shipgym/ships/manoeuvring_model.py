@@ -67,7 +67,11 @@ class ManoeuvringModel:
         """Coefficients as floats, in the order of the structure."""
         names = self.dynamics.coefficient_names
         if self.coefficients.keys() != set(names):
-            raise _other_coefficients(self.name, names, self.coefficients)
+            raise _other_coefficients(
+                self.name,
+                names,
+                self.coefficients,
+            )
         checked = {}
         for name in names:
             value = self.coefficients[name]

@@ -220,7 +220,13 @@ def accelerations(
     X = X_H + X_R + X_P
     Y = Y_H + Y_R
     N = N_H + N_R
-    udot, vdot, rdot = planar_accelerations(motion, X, Y, N, mass)
+    udot, vdot, rdot = planar_accelerations(
+        motion,
+        X,
+        Y,
+        N,
+        mass,
+    )
     return udot, vdot, rdot, 0.0, 0.0
 
 
@@ -245,7 +251,14 @@ def flow_of(motion: Motion, c: Any, ship: Ship) -> Flow:
     K_T_nn = c.thrust * (
         c.k_0 * tip * tip + c.k_1 * tip * inflow + c.k_2 * inflow * inflow
     )
-    return Flow(U, v * per_U, r_, beta, inflow, K_T_nn)
+    return Flow(
+        U,
+        v * per_U,
+        r_,
+        beta,
+        inflow,
+        K_T_nn,
+    )
 
 
 class Turn(NamedTuple):

@@ -147,7 +147,11 @@ def factored(monomials: Sequence[Monomial]) -> str:
     shared: Counter[str] = Counter()
     for _, powers in monomials:
         shared.update(powers.keys())
-    variable, count = max(shared.items(), key=itemgetter(1), default=("", 0))
+    variable, count = max(
+        shared.items(),
+        key=itemgetter(1),
+        default=("", 0),
+    )
     if count < 2:
         return " + ".join(_product(*monomial) for monomial in monomials)
 
