@@ -91,15 +91,10 @@ def check_function(
     code = value.__code__
     names = code.co_varnames[: code.co_argcount]
     unknown = set(names[count:]) - set(extras)
-    if code.co_flags & (CO_VARARGS | CO_VARKEYWORDS | CO_GENERATOR):
-        found = "one with variable arguments or a generator"
-    elif len(names) < count or (unknown and not extras):
-        found = f"one of {len(names)} arguments"
-    elif unknown:
-        found = f"one with {unknown.pop()!r}"
-    else:
-        return
-    raise InputError(f"{where}: expected {what}, got {found}")
+    special = code.co_flags & (CO_VARARGS | CO_VARKEYWORDS | CO_GENERATOR)
+    if special or len(names) < count or unknown:
+        found = ", ".join(names) or "none"
+        raise InputError(f"{where}: expected {what}, got one of arguments {found}")
 
 
 def refuse_closure(function: Any) -> None:

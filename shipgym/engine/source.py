@@ -20,9 +20,9 @@ from shipgym.engine.records import (
     leaves,
     members,
 )
+from shipgym.engine.refused_code import refuse_foreign_random
 from shipgym.errors import InputError
 from shipgym.python_files import asked, check_function, load_file, refuse_closure
-from shipgym.refused_code import refuse_foreign_random
 
 UNBOUNDED = Setting("")
 

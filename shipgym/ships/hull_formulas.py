@@ -20,7 +20,13 @@ from dataclasses import replace
 from typing import Any
 
 from shipgym.ships.mmg import SHIP, dimensions
-from shipgym.ships.particulars import ADDED_MASSES, Particulars, main_dimensions
+from shipgym.ships.particulars import (
+    ADDED_MASSES,
+    Estimates,
+    Particulars,
+    main_dimensions,
+    with_estimates,
+)
 
 YOSHIMURA = "yoshimura"
 
@@ -39,21 +45,15 @@ def completed(particulars: Particulars) -> Particulars:
 
     L, B, T, _ = main_dimensions(ship)
     usual_area = L * T / 100.0 * (1.0 + 25.0 * (B / L) ** 2)
-    area = ship.rudder_area or usual_area
-    span = 0.76 * T
     rudders = ship.rudders or 1.0
-    usual = {
-        "rudder_area": area,
-        "propeller_diameter": 0.6 * T,
-        "rudder_aspect_ratio": span**2 * rudders / area,
+    estimates: Estimates = {
+        "rudder_area": lambda ship: usual_area,
+        "propeller_diameter": lambda ship: 0.6 * T,
+        "rudder_aspect_ratio": lambda ship: (
+            (0.76 * T) ** 2 * rudders / ship.require("rudder_area")
+        ),
     }
-
-    absent = dict[str, Any]()
-    for name, value in usual.items():
-        if ship[name] is None:
-            absent[name] = value
-    estimated = ship.estimated | absent.keys()
-    return replace(ship, **absent, estimated=estimated)
+    return with_estimates(ship, estimates)
 
 
 def formula_coefficients(ship: Particulars) -> dict[str, float]:

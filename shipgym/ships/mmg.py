@@ -176,8 +176,8 @@ class Flow(NamedTuple):
     """Water that flows at hull, propeller and rudder."""
 
     U: float  # m/s, at least a little
-    v_: float  # sway by U
-    r_: float  # yaw rate by U / L
+    v: float  # sway by U
+    r: float  # yaw rate by U / L
     beta: float  # rad, drift angle
     inflow: float  # m/s, at the propeller
     K_T_nn: float  # thrust coefficient by (n D)^2
@@ -261,13 +261,6 @@ def flow_of(motion: Motion, c: Any, ship: Ship) -> Flow:
     )
 
 
-class Turn(NamedTuple):
-    """Sway by U and yaw rate by U / L."""
-
-    v: float
-    r: float
-
-
 surge_force = letter_sum("X", ("vv", "vr", "rr", "vvvv"))
 HIGHER = ("v", "vvv", "vvr", "vrr", "rrr")
 sway_force = letter_sum("Y", HIGHER)
@@ -276,14 +269,13 @@ yaw_moment = letter_sum("N", HIGHER)
 
 def hull_forces(c: Any, flow: Flow, ship: Ship) -> tuple[float, float, float]:
     """Forces X_H, Y_H and moment N_H of the hull, polynomials in v' and r'."""
-    r = flow.r_
-    at = Turn(flow.v_, r)
+    r = flow.r
     slowed = power_law(flow.U / ship.speed, c.speed_power)
     by_rate = slowed * r
-    X = surge_force(at, c) - c.R_0
-    Y = sway_force(at, c) + c.Y_0 + c.Y_r * by_rate
+    X = surge_force(flow, c) - c.R_0
+    Y = sway_force(flow, c) + c.Y_0 + c.Y_r * by_rate
     N = (
-        yaw_moment(at, c)
+        yaw_moment(flow, c)
         + c.N_0
         + c.N_r * by_rate
         + c.N_absr * fabs(r)
@@ -296,7 +288,7 @@ def hull_forces(c: Any, flow: Flow, ship: Ship) -> tuple[float, float, float]:
 def rudder_force(motion: Motion, c: Any, flow: Flow) -> tuple[float, float, float]:
     """Normal force F_N of the rudder, and sine and cosine of its angle."""
     # v_R = U gamma_R beta_R
-    beta_R = flow.beta - c.l_R * flow.r_
+    beta_R = flow.beta - c.l_R * flow.r
     side = c.gamma_R_side if beta_R >= 0.0 else -c.gamma_R_side
     v_R = flow.U * (c.gamma_R + side) * beta_R
 

@@ -78,9 +78,7 @@ class Term:
     def check(self, where: str) -> None:
         """Refuse symbols and powers that cannot be computed, naming the term."""
         place = f"{where}: term '{self.name}'"
-        factors = 0
-        # Limits of what a file may ask for: power of a symbol, factors of a term, terms
-        # of an equation.
+        # largest power that a file may ask for
         largest_power = 9
         for symbol, power in self.powers:
             if symbol not in SYMBOLS:
@@ -97,12 +95,6 @@ class Term:
             )
             if whole == 0:
                 raise unexpected(at, "an integer other than 0", power)
-            factors += abs(whole)
-        most_factors = 20
-        if factors > most_factors:
-            raise InputError(
-                f"{place}: expected at most {most_factors} factors, got {factors}"
-            )
 
     def to_dict(self) -> dict[str, Any]:
         """Name and powers, as written in a model file."""

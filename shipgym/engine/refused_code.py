@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from shipgym.engine.specialise import users_functions
 from shipgym.errors import InputError
-from shipgym.python_files import LIBRARIES, nested_code
+from shipgym.python_files import nested_code
 
 #: Modules of random numbers that depend on more than key and number of an episode.
 _MODULES = {"numpy.random": np.random, "random": random}
@@ -24,26 +25,16 @@ def refuse_foreign_random(function: FunctionType) -> None:
     The functions that it calls are searched too. Such numbers are neither those of the
     episode's seed nor the same for one ship and many.
     """
-    for place, found in _foreign_random(function, {function}):
-        raise InputError(
-            f"{place}: expected random numbers of the episode, got those of {found};"
-            " in a function with the argument `random` draw them with drawn(random,"
-            " number, low, high)"
-        )
-
-
-def _foreign_random(function: Any, known: set[Any]) -> Iterator[tuple[str, str]]:
-    """Places, and modules, of random numbers in a function and those that it calls."""
-    names = function.__globals__
-    for code in nested_code(function.__code__):
-        for line, value in _named_values(code, names):
-            module = _module_of(value)
-            if module:
-                place = f"{code.co_filename}, line {line}, in {code.co_name}"
-                yield place, module
-            elif _is_users(value) and value not in known:
-                known.add(value)
-                yield from _foreign_random(value, known)
+    for one in users_functions(function, {}):
+        for code in nested_code(one.__code__):
+            for line, value in _named_values(code, one.__globals__):
+                if module := _module_of(value):
+                    raise InputError(
+                        f"{code.co_filename}, line {line}, in {code.co_name}: expected"
+                        f" random numbers of the episode, got those of {module}; in a"
+                        " function with the argument `random` draw them with"
+                        " drawn(random, number, low, high)"
+                    )
 
 
 def _named_values(code: CodeType, names: dict[str, Any]) -> Iterator[tuple[int, Any]]:
@@ -87,10 +78,3 @@ def _module_of(value: Any) -> str:
     if isinstance(owner, _GENERATORS):
         return "random" if isinstance(owner, random.Random) else "numpy.random"
     return ""
-
-
-def _is_users(value: Any) -> bool:
-    """Return whether a value is a function of a user's own."""
-    if not isinstance(value, FunctionType):
-        return False
-    return not value.__code__.co_filename.startswith(LIBRARIES)
