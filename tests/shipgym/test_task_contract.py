@@ -207,7 +207,7 @@ WRONG = {
         ("    nearest_east: Anno", "Observation: .* got 2 fields 'nearest_east'"),
     ],
     "plan, random):\n    first": [
-        ("plan, chance):\n    first", "with or without random and plan .* 'chance'"),
+        ("plan, chance):\n    first", "with or without random and plan .* chance"),
     ],
 }
 CASES = [(old, new, message) for old, many in WRONG.items() for new, message in many]
