@@ -7,7 +7,6 @@ from .standard import register_manoeuvre as register_manoeuvre
 from .standard import standard_manoeuvres as standard_manoeuvres
 from .stopping import StoppingIndices as StoppingIndices
 from .stopping import crash_stop as crash_stop
-from .stopping import stopping as stopping
 from .stopping import stopping_indices as stopping_indices
 from .turning import TurningIndices as TurningIndices
 from .turning import turning_circle as turning_circle

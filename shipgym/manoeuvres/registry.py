@@ -147,8 +147,8 @@ def standard_manoeuvres(
     -------
     dict of str to Manoeuvre
         Zigzags 10/10 and 20/20 and turning circles with full rudder, each to both
-        sides; with a shaft an inertia stop, and a crash stop where her equations hold
-        for a shaft astern; and what was registered besides (`register_manoeuvre`).
+        sides; a crash stop where her equations hold for a shaft astern; and what was
+        registered besides (`register_manoeuvre`).
     """
     found = dict[str, Manoeuvre]()
     for family in families_of(model, water_depth).values():
