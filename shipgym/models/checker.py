@@ -110,32 +110,29 @@ def _wrong_courses(model: ShipModel) -> Iterator[str]:
         f"rudder {np.degrees(limit):.0f} deg to port": (-limit, turn_lengths),
     }
     for name, (rudder, lengths) in courses.items():
-        wrong = ""
-        heel = 0.0
         try:
             trial = _run(model, rudder, lengths)
-            if "phi" in trial:
-                heel = float(np.abs(trial["phi"]).max())
+            heel = float(np.abs(trial["phi"]).max()) if "phi" in trial else 0.0
+            wrong = ""
         except UnstableModelError as error:
-            wrong = str(error)
             heel = abs(error.state.get("phi", 0.0))
+            wrong = (
+                f"{error}; identify it from trials with larger rudder angles, or with"
+                " fewer terms"
+            )
         if not heel < capsized:
-            yield (
-                f"{name}: expected a heel of less than {np.degrees(capsized):.0f} deg,"
-                f" got {np.degrees(heel):.3g} deg; look at the terms of roll, whose"
+            wrong = (
+                f"expected a heel of less than {np.degrees(capsized):.0f} deg, got"
+                f" {np.degrees(heel):.3g} deg; look at the terms of roll, whose"
                 " coefficient of phi rights the ship where it is negative; identify it"
                 " from trials with more roll"
             )
-        elif wrong:
-            yield (
-                f"{name}: {wrong}; identify it from trials with larger rudder angles,"
-                " or with fewer terms"
-            )
+        if wrong:
+            yield f"{name}: {wrong}"
 
 
 def _wrong_rudder(model: ShipModel) -> Iterator[str]:
-    if not _steers(model):
-        return
+    """Say if a rudder to starboard turns the ship less than one to port."""
     rudder = np.radians(5.0)
     lengths = 3.0
     try:
@@ -143,7 +140,7 @@ def _wrong_rudder(model: ShipModel) -> Iterator[str]:
         port = np.degrees(_run(model, -rudder, lengths)["r"][-1])
     except UnstableModelError:
         return  # the courses say so
-    if not starboard > port:
+    if _steers(model) and not starboard > port:
         yield (
             "rudder: expected a larger yaw rate for a rudder to starboard than to port,"
             f" got {starboard:.3g} deg/s for {np.degrees(rudder):.0f} deg to starboard"

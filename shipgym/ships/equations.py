@@ -179,9 +179,8 @@ class ShipEquations:
 
     @property
     def coefficient_names(self) -> tuple[str, ...]:
-        """Names in the order of the record."""
-        names: tuple[str, ...] = self.coefficients_record._fields  # type: ignore[attr-defined]
-        return names
+        """Names of the published coefficients, in their order."""
+        return tuple(self.coefficients)
 
     @property
     def coefficients(self) -> dict[str, float]:

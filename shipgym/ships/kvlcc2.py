@@ -28,11 +28,6 @@ class KVLCC2Equations(ShipEquations):
     scales: ClassVar[bool] = False
 
     @property
-    def coefficient_names(self) -> tuple[str, ...]:
-        """Names as published."""
-        return tuple(PUBLISHED["coefficients"])
-
-    @property
     def coefficients(self) -> dict[str, float]:
         """Those of the 7 m model."""
         return dict(PUBLISHED["coefficients"])

@@ -316,13 +316,8 @@ class MMGEquations(ShipEquations):
     scales: ClassVar[bool] = True
 
     @property
-    def coefficient_names(self) -> tuple[str, ...]:
-        """Names of the coefficients alone, those that are identified first."""
-        return IDENTIFIED + KNOWN
-
-    @property
     def coefficients(self) -> dict[str, float]:
-        """Coefficients of KVLCC2."""
+        """Coefficients of KVLCC2, those that are identified first."""
         return dict(STANDARD)
 
     def numbers(
