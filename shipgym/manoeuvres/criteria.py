@@ -173,11 +173,8 @@ class Criterion:
         """The worse side: of the trials, without any of the model."""
         if self.worse_measured is not None:
             return self.worse_measured.side
-        values = {}
-        for side in self.sides:
-            value = side.drawn.value
-            values[side.name] = np.inf if value is None else value
-        return max(values, key=lambda name: values[name], default="")
+        worst_side = max(self.sides, key=_value_or_worse, default=None)
+        return "" if worst_side is None else worst_side.name
 
     @cached_property
     def _chances(self) -> Chances:
@@ -281,6 +278,11 @@ class Criterion:
         return fields
 
 
+def _value_or_worse(side: Side) -> float:
+    """Index of the model on a side; infinite where it has none."""
+    return np.inf if side.drawn.value is None else side.drawn.value
+
+
 def side_in_words(manoeuvre: str, side: str) -> str:
     """Trial of a manoeuvre to one side: "35 deg turn to port"."""
     if manoeuvre.endswith("turn"):
@@ -322,10 +324,7 @@ def outside_envelope(model: ShipModel, test: Manoeuvre) -> bool:
     within_half_turn = np.abs(psi - psi[0]) <= np.pi
     part = np.logical_and.accumulate(within_half_turn)
     none = np.zeros(len(run))
-    states = []
-    for name in ENVELOPE_CHANNELS:
-        values = run.channels.get(name, none)
-        states.append(values[part])
+    states = [run.channels.get(name, none)[part] for name in ENVELOPE_CHANNELS]
     distances = model.envelope.distance(*states)
     return bool(distances.max() > 1.15)
 
@@ -349,12 +348,11 @@ def with_measured(
 
 def _with_trial(sides: Sequence[Side], measured: MeasuredIndex) -> tuple[Side, ...]:
     """The sides with a trial on its own, if it is the worst there."""
-    after = []
-    for side in sides:
+
+    def with_trial(side: Side) -> Side:
         known = side.measured
         is_worst = known is None or measured.value > known.value
-        if side.name == measured.side and is_worst:
-            after.append(side._replace(measured=measured))
-        else:
-            after.append(side)
-    return tuple(after)
+        is_own = side.name == measured.side and is_worst
+        return side._replace(measured=measured) if is_own else side
+
+    return tuple(with_trial(side) for side in sides)

@@ -83,14 +83,12 @@ def reversals(trial: Trial) -> Reversals:
     delta = rudder(trial)
     start = execute_time(trial)
     usual = usual_rudder(trial)
-    if is_ordered(trial):
-        holds = _holds(t, delta, start, ORDERED * usual)
-        first_samples = [hold[0] for hold in holds[1:]]
-        turns = t[first_samples].tolist()
-    else:
-        holds = _holds(t, delta, start, MEASURED * usual)
-        turns = _departures(t, delta, holds)
-    return Reversals(start, turns)
+    ordered = is_ordered(trial)
+    part = ORDERED if ordered else MEASURED
+    holds = _holds(t, delta, start, part * usual)
+    if not ordered:
+        return Reversals(start, _departures(t, delta, holds))
+    return Reversals(start, t[[hold[0] for hold in holds[1:]]].tolist())
 
 
 def _departures(t: Floats, delta: Floats, holds: list[Floats]) -> list[float]:

@@ -61,9 +61,7 @@ def check_physical(model: ShipModel, trial: Trial) -> None:
         if beyond.any():
             k = int(np.argmax(beyond))
             time_s = float(trial.t[k])
-            state = {}
-            for channel, values in trial.channels.items():
-                state[channel] = float(values[k])
+            state = {name: float(row[k]) for name, row in trial.channels.items()}
             raise UnstableModelError(
                 f"model {model.name!r} runs away after {time_s:.1f} s"
                 f" ({name} = {state[name]:.3g})",

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -46,12 +45,6 @@ class TurningIndices:
     # drift angle at midship in the steady turn, degrees, positive when the bow points
     # into the turn
     steady_drift_deg: float | None
-
-
-class _SteadyTurn(NamedTuple):
-    diameter_lengths: float | None
-    speed_ratio: float | None
-    drift_deg: float | None
 
 
 @takes_name
@@ -112,23 +105,27 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
 
     half_turn = np.pi
     quarter_turn = np.pi / 2
-    steady = _SteadyTurn(None, None, None)
+    diameter = speed_ratio = drift_deg = None
     if turned[-1] > half_turn + quarter_turn:
         steady = _steady_turn(trial, after, turned, side, lpp)
+        diameter, speed_ratio, drift_deg = steady
     return TurningIndices(
         advance_lengths=reached(turned, quarter_turn, ahead),
         transfer_lengths=reached(turned, quarter_turn, aside),
         tactical_diameter_lengths=reached(turned, half_turn, aside),
-        steady_diameter_lengths=steady.diameter_lengths,
-        steady_speed_ratio=steady.speed_ratio,
-        steady_drift_deg=steady.drift_deg,
+        steady_diameter_lengths=diameter,
+        steady_speed_ratio=speed_ratio,
+        steady_drift_deg=drift_deg,
     )
 
 
 def _steady_turn(
     trial: Trial, after: Flags, turned: Floats, side: float, length: float
-) -> _SteadyTurn:
-    """Steady turn in its last quarter; `turned` to its `side`, from the order on."""
+) -> tuple[float, float, float]:
+    """Diameter, lengths, ratio of speeds and drift, deg, in the last quarter turn.
+
+    `turned` to its `side`, from the order on.
+    """
     u = trial["u"][after]
     v = trial["v"][after]
     r = trial["r"][after]
@@ -140,10 +137,10 @@ def _steady_turn(
     mean_rate = side * r[steady].mean()
     mean_drift = side * drift[steady].mean()
     diameter = 2.0 * mean_speed / mean_rate
-    return _SteadyTurn(
-        diameter_lengths=float(diameter / length),
-        speed_ratio=float(mean_speed / speed[0]),
-        drift_deg=float(np.degrees(mean_drift)),
+    return (
+        float(diameter / length),
+        float(mean_speed / speed[0]),
+        float(np.degrees(mean_drift)),
     )
 
 

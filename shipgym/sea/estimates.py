@@ -30,20 +30,11 @@ def weather_particulars(particulars: Particulars) -> Particulars:
     Raises InputError, "weather without the particulars it needs", without length, beam,
     draught and mass or block coefficient.
     """
-    missing = []
-    for name in ("beam", "draught"):
-        if particulars[name] is None:
-            missing.append(name)
-    if particulars.mass is None and particulars.block_coefficient is None:
-        missing.append("block_coefficient (or mass)")
-    if missing:
-        listed = ", ".join(missing)
-        raise InputError(
-            f"weather without the particulars it needs: {listed} of {particulars.name}"
-            " is not known; give it in [ship] of the ship file or in the model's"
-            " particulars"
-        )
-    return with_estimates(particulars.completed(), _ESTIMATES)
+    try:
+        completed = particulars.completed()
+    except InputError as error:
+        raise InputError(f"weather without the particulars it needs: {error}") from None
+    return with_estimates(completed, _ESTIMATES)
 
 
 def freeboard(ship: Particulars) -> float:
