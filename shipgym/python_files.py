@@ -42,7 +42,12 @@ def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
     try:
         # compiled here, because Python's own cache takes a file changed within a second
         # for the same; and independent of what this file may import from __future__
-        code = compile(resolved.read_bytes(), str(resolved), "exec", dont_inherit=True)
+        code = compile(
+            resolved.read_bytes(),
+            str(resolved),
+            "exec",
+            dont_inherit=True,
+        )
         exec(code, vars(module))
     except BaseException as error:
         del sys.modules[name]

@@ -55,7 +55,15 @@ def _named_values(code: CodeType, names: dict[str, Any]) -> Iterator[tuple[int, 
                     f" {name.upper()} = {called}.{name} there"
                 )
             is_module = isinstance(value, ModuleType)
-            value = getattr(value, instruction.argval, None) if is_module else None
+            value = (
+                getattr(
+                    value,
+                    instruction.argval,
+                    None,
+                )
+                if is_module
+                else None
+            )
         else:
             value = None
         yield line_of(instruction, code), value

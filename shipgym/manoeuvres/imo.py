@@ -62,7 +62,12 @@ def assess_draws(
     needed = imo_manoeuvres(model)
     own = own_indices(model, needed)
     evaluations = {name: test.evaluate for name, test in needed.items()}
-    found = intervals_of(own, draws, evaluations, progress)
+    found = intervals_of(
+        own,
+        draws,
+        evaluations,
+        progress,
+    )
     return imo_criteria(model, found)
 
 

@@ -194,7 +194,13 @@ def open_loop_states(model: ManoeuvringModel, trial: Trial, starts: Floats) -> F
     loop = ship_loop(
         model.compiled, "open_loop", OPEN_SEA if mean_wind.any() else STILL_WATER
     )
-    found = np.zeros((len(starts), len(t), len(model.state_names)))
+    found = np.zeros(
+        (
+            len(starts),
+            len(t),
+            len(model.state_names),
+        )
+    )
     found[:, 0] = starts
     longest_step = LONGEST_STEP * model.travel_time
     for states in found:

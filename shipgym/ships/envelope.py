@@ -56,7 +56,12 @@ class Envelope:
         self, u: ArrayLike, v: ArrayLike, r: ArrayLike, delta: ArrayLike
     ) -> Floats:
         """Distance of states, SI, from the centre; 1 on the ellipsoid."""
-        channels = np.broadcast_arrays(u, v, r, delta)
+        channels = np.broadcast_arrays(
+            u,
+            v,
+            r,
+            delta,
+        )
         states = np.stack(channels, axis=-1)
         offsets = (states - self.centre) @ self.shape.T
         distance: Floats = np.linalg.norm(offsets, axis=-1)

@@ -84,7 +84,11 @@ class SharedStructure(Structure):
     def added_mass(self, coefficients: Mapping[str, float]) -> Floats:
         """Derivatives of (X, Y, N) by (udot, vdot, rdot), prime system, (3, 3)."""
         matrix = np.zeros((3, 3))
-        for row, axis in zip(matrix, AXES, strict=True):
+        for row, axis in zip(
+            matrix,
+            AXES,
+            strict=True,
+        ):
             for share in self.shares[axis]:
                 if share.acceleration is None:
                     continue

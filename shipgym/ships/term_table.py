@@ -421,7 +421,11 @@ def _check_structure(table: Structure) -> None:
     where = f"structure '{table.name}'"
     check_text(table.name, "structure: name")
     check_text(table.source, f"{where}: source")
-    normalisations = ("prime", "service", "si")
+    normalisations = (
+        "prime",
+        "service",
+        "si",
+    )
     check_choice(table.normalisation, normalisations, f"{where}: normalisation")
     quantities = ("force", "acceleration")
     check_choice(table.quantity, quantities, f"{where}: quantity")

@@ -164,7 +164,7 @@ def test_weather_tells_which_particulars_it_needs():
     bare = replace(model.particulars, beam=None, mass=None, block_coefficient=None)
     with pytest.raises(
         InputError,
-        match="weather without the particulars it needs: .* without beam, block",
+        match=r"weather without the particulars it needs: .* without beam, block",
     ):
         mobility_matrix(replace(model, particulars=bare))
 
