@@ -37,10 +37,11 @@ def sail_lanes(
     )
     n_samples = len(segment.measured)
     states = np.empty((n_samples, starts.size))
+    state = starts.copy()
+    state[model.state_names.index("delta")] = segment.inputs[0, 1]
     loop(
-        starts.ravel(),
+        state.ravel(),
         ships.ravel(),
-        np.zeros(LANES),  # offsets of the rudders
         segment.inputs,
         segment.samples,
         states,

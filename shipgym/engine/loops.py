@@ -52,7 +52,7 @@ LOOPS = {
     ),
     "segments": Loop(
         batches.sail_segment,
-        f"void({VECTOR}, {VECTOR}, {VECTOR}, {TABLE}, int64[::1], {TABLE})",
+        f"void({VECTOR}, {VECTOR}, {TABLE}, int64[::1], {TABLE})",
         LANES,
         shared=False,
         hooks=MEASURED_GEAR,

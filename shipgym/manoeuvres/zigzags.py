@@ -107,25 +107,14 @@ def zigzag(
     )
     trial = as_trial(model, dt, states, orders(model, rudder), kind="zigzag")
     if must_reverse and n_reversals == 0:
-        _refuse_without_reversal(model, trial, rudder_deg, heading_deg)
+        raise ManoeuvreError(
+            f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}: expected the"
+            f" heading to change by {heading_deg:g} deg, where the rudder is reversed,"
+            f" got less in {trial.duration:g} s; sail longer, or order more rudder or"
+            " less heading",
+            trial,
+        )
     return trial
-
-
-def _refuse_without_reversal(
-    model: ShipModel, trial: Trial, rudder_deg: float, heading_deg: float
-) -> None:
-    psi = trial["psi"]
-    ordered = trial["delta_command"]
-    side = np.sign(ordered[0])
-    changes = side * (psi - psi[0])
-    largest_deg = np.degrees(changes.max())
-    raise ManoeuvreError(
-        f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}: expected the heading"
-        f" to change by {heading_deg:g} deg, where the rudder is reversed, got"
-        f" {largest_deg:.3g} deg to the side of the rudder in {trial.duration:g} s;"
-        " sail longer, or order more rudder or less heading",
-        trial,
-    )
 
 
 def zigzag_indices(

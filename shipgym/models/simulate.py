@@ -257,11 +257,8 @@ def initial_state(model: ManoeuvringModel, state: ArrayLike | None) -> Floats:
     if state is None:
         return model.service_state
     start = np.asarray(state, dtype=float)
-    names = model.state_names
-    n = len(names)
-    if start.shape != (n,) or not np.all(np.isfinite(start)):
-        listed = ", ".join(names)
-        expected = f"{n} finite numbers for {listed}"
+    if start.shape != (len(model.state_names),) or not np.all(np.isfinite(start)):
+        expected = f"finite numbers for {', '.join(model.state_names)}"
         raise unexpected("state", expected, start.tolist())
     return start
 

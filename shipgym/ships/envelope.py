@@ -76,10 +76,9 @@ class Envelope:
     def from_dict(cls, content: Any, where: str) -> Self:
         """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
         table = check_table(content, where, allowed=("channels", *SHAPES))
-        expected = list(ENVELOPE_CHANNELS)
-        if table.get("channels") != expected:
-            found = table.get("channels")
-            raise unexpected(f"{where}.channels", str(expected), found)
+        found = table.get("channels")
+        if found != list(ENVELOPE_CHANNELS):
+            raise unexpected(f"{where}.channels", str(ENVELOPE_CHANNELS), found)
         arrays = {
             name: check_array(table.get(name), shape, f"{where}.{name}")
             for name, shape in SHAPES.items()

@@ -66,15 +66,10 @@ class GreyBox(Structure):
     def __post_init__(self) -> None:
         super().__post_init__()
         where = f"structure '{self.name}'"
-        if self.reference is None:
-            raise InputError(
-                f"{where}: expected a ManoeuvringModel as reference, or the name of a"
-                " shipped model, got none"
-            )
-        if isinstance(self.reference.dynamics, GreyBox):
+        if isinstance(self.ship.dynamics, GreyBox):
             raise InputError(
                 f"{where}: expected a reference ship or a table of terms, got"
-                f" {self.reference.name!r}, a grey box itself; take that grey box's own"
+                f" {self.ship.name!r}, a grey box itself; take that grey box's own"
                 " reference"
             )
         if self.quantity != "acceleration":
@@ -82,10 +77,10 @@ class GreyBox(Structure):
                 f"{where}: expected quantity 'acceleration', because the terms are"
                 " added to the reference ship's accelerations, got 'force'"
             )
-        if self.shaft and "n" not in self.reference.command_names:
+        if self.shaft and "n" not in self.ship.command_names:
             raise InputError(
                 f"{where}: expected shaft false, because reference"
-                f" {self.reference.name!r} has no shaft speed, got true; leave it out"
+                f" {self.ship.name!r} has no shaft speed, got true; leave it out"
             )
 
     @property

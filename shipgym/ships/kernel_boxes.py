@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_array, check_flag, check_table, check_text, unexpected
+from shipgym.checks import check_array, check_flag, check_table, check_text
 from shipgym.engine import stages
 from shipgym.engine.compiled_ship import CompiledShip
 from shipgym.engine.lane_records import Point, Sums
@@ -140,19 +140,9 @@ def gaussians(x: Floats, centres: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class KernelBox(GreyBox):
-    """Accelerations of a reference ship plus sums of a kernel's features.
-
-    Raises InputError for no kernel, and as `GreyBox`.
-    """
+    """Accelerations of a reference ship plus sums of a kernel's features."""
 
     kernel: Kernel = field(default=None, repr=False)  # type: ignore[assignment]
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.kernel, Kernel):
-            raise unexpected(
-                f"structure '{self.name}': kernel", "a Kernel", self.kernel
-            )
-        super().__post_init__()
 
     def features(
         self,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -296,7 +295,3 @@ def test_what_cannot_be(
         identify(
             trials, structure="linear", particulars=SHIP, method=LSSVM(kernel="rbf")
         )
-    with pytest.raises(InputError, match="kernel: expected a Kernel"):
-        replace(truth.table, kernel=None)
-    with pytest.raises(InputError, match="expected a ManoeuvringModel as reference"):
-        replace(truth.table, reference=None)

@@ -163,11 +163,6 @@ def test_changed_coefficients_compile_nothing_anew(tug: Path) -> None:
             marks=pytest.mark.compiled,
         ),
         (
-            "speed=2.357,",
-            "speed=2.357, rolls='yes',",
-            "rolls: expected a boolean",
-        ),
-        (
             "c.N_v * U",
             "c.N_w * U",
             r"tug\.py, line LINE, in accelerations: .*no attribute 'N_w'",
