@@ -40,20 +40,32 @@ def switched(
 ) -> Motion:
     """State after a step in which the rudder reverses when the heading has moved.
 
-    The instant is found by halving: fifty times, to rounding.
+    The instant is found by regula falsi on the heading after part of the step; the miss
+    of the end that stays is halved each time, as the Illinois variant does where an end
+    stays twice.
     """
     side = 1.0 if command > 0.0 else -1.0
+    end = sail_step(motion, command, n, h, pushed, coefficients, ship)
     low = 0.0
     high = 1.0
-    halvings = 50
-    for _ in range(halvings):
-        part = 0.5 * (low + high)
+    miss_low = side * motion.psi - threshold
+    miss_high = side * end.psi - threshold
+    part = 1.0
+    switch_iterations = 12
+    for _ in range(switch_iterations):
+        part = low - miss_low * (high - low) / (miss_high - miss_low)
         after = sail_step(motion, command, n, part * h, pushed, coefficients, ship)
-        if side * after.psi < threshold:
-            low = part
-        else:
+        miss = side * after.psi - threshold
+        if miss > 0.0:
             high = part
-    part = high
+            miss_high = miss
+            miss_low = 0.5 * miss_low
+        elif miss < 0.0:
+            low = part
+            miss_low = miss
+            miss_high = 0.5 * miss_high
+        else:
+            break
     crossing = sail_step(motion, command, n, part * h, pushed, coefficients, ship)
     rest = (1.0 - part) * h
     return sail_step(crossing, -command, n, rest, pushed, coefficients, ship)

@@ -148,11 +148,11 @@ def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
         return CALM
     sine, cosine = sin_cos(motion.psi)
     felt = relative_wind(motion, sine, cosine, sea, p)
-    wind = accelerations(felt.angle, felt.squared_speed, p.by_wind)
+    wind = response_to(felt.angle, felt.squared_speed, p.by_wind)
     # the model's own surge has the resistance of still air already
     still_air = motion.u * fabs(motion.u) * p.still_air
     waves = from_bow(sine, cosine, sea.waves_north, sea.waves_east)
-    drift = accelerations(waves, 1.0 + sea.drift, p.by_waves)
+    drift = response_to(waves, 1.0 + sea.drift, p.by_waves)
     return Push(
         wind.surge + still_air + drift.surge,
         wind.sway + drift.sway,
@@ -163,7 +163,7 @@ def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
     )
 
 
-def accelerations(angle: FromBow, size: float, series: Response) -> Accelerations:
+def response_to(angle: FromBow, size: float, series: Response) -> Accelerations:
     """Accelerations of a response at an angle, times its size."""
     cosine, sine = angle
     roll = 0.0
