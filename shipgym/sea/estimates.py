@@ -31,10 +31,9 @@ def weather_particulars(particulars: Particulars) -> Particulars:
     draught and mass or block coefficient.
     """
     try:
-        completed = particulars.completed()
+        return with_estimates(particulars.completed(), _ESTIMATES)
     except InputError as error:
         raise InputError(f"weather without the particulars it needs: {error}") from None
-    return with_estimates(completed, _ESTIMATES)
 
 
 def freeboard(ship: Particulars) -> float:
