@@ -149,7 +149,9 @@ def reduced_structure(
     kept = {
         q: {
             term.name
-            for term, label in zip(structure.terms(q), structure.names(q), strict=True)
+            for term, label in zip(
+                structure.equations[q], structure.names(q), strict=True
+            )
             if label in reductions[q].terms
         }
         for q in structure.equations
@@ -157,7 +159,7 @@ def reduced_structure(
     if structure.quantity == "force" and {"v", "r"} <= kept.keys():
         kept["v"] = kept["r"] = kept["v"] | kept["r"]
     equations = {
-        q: tuple(term for term in structure.terms(q) if term.name in names)
+        q: tuple(term for term in structure.equations[q] if term.name in names)
         for q, names in kept.items()
     }
     source = f"{structure.source}; reduced"

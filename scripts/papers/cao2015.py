@@ -115,7 +115,7 @@ def as_printed(samples: str, by_length: bool = True) -> ShipModel:
     length = particulars.length if by_length else 1.0
     theta = []
     for q in table.equations:
-        lengths = np.array([length ** term.power("r") for term in table.terms(q)])
+        lengths = np.array([length ** term.power("r") for term in table.equations[q]])
         estimator = LSSVM(C=C[q], scale=False, fit_intercept=False)
         estimator.fit(regression.features[q] * lengths, regression.targets[q])
         theta.append(estimator.coef_ * lengths)

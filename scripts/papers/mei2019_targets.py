@@ -244,7 +244,7 @@ def acceleration_correlations(target: Target, model: ShipModel) -> dict[str, flo
     theta = np.split(
         box.acceleration_matrix(model.particulars, shaft)
         @ np.array(list(model.coefficients.values())),
-        np.cumsum([len(box.terms(q)) for q in changes.targets])[:-1],
+        np.cumsum([len(box.equations[q]) for q in changes.targets])[:-1],
     )
     found = {}
     for (q, change), terms in zip(changes.targets.items(), theta, strict=True):

@@ -101,16 +101,15 @@ def locked(path: Path) -> Iterator[None]:
         lock.release()
 
 
-@cache
-def warn_once(message: str) -> None:
-    """Warn, once in a process."""
-    warnings.warn(message, CacheWarning, stacklevel=3)
-
-
 def warn_of(folder: Path, error: BaseException) -> None:
-    """Warn that nothing can be stored, and name the remedy."""
-    reason = getattr(error, "strerror", error)
-    warn_once(
+    """Warn that nothing can be stored, and name the remedy, once in a process."""
+    _warn_once(folder, str(getattr(error, "strerror", error)))
+
+
+@cache
+def _warn_once(folder: Path, reason: str) -> None:
+    message = (
         f"{folder}: cannot be written ({reason}), so ships are compiled again in each"
         f" process. Set {CACHE_VARIABLE} to a folder that can."
     )
+    warnings.warn(message, CacheWarning, stacklevel=4)

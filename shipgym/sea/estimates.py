@@ -42,39 +42,34 @@ def freeboard(ship: Particulars) -> float:
     return hull.T * (1.3 - 1.05 * hull.CB)
 
 
-def house_height(ship: Particulars) -> float:
-    """Estimated height of the superstructure above the deck, m."""
-    return 0.07 * ship.length
-
-
-def house_area(ship: Particulars) -> float:
-    """Estimated lateral area of the superstructure, m2."""
-    return 0.15 * ship.length * house_height(ship)
+def house(ship: Particulars) -> tuple[float, float]:
+    """Estimated height of the superstructure above the deck, m, and lateral area."""
+    height = 0.07 * ship.length
+    return height, 0.15 * ship.length * height
 
 
 def _frontal_area(ship: Particulars) -> float:
     # the house is 0.6 of the beam wide
-    return ship.require("beam") * (freeboard(ship) + 0.6 * house_height(ship))
+    return ship.require("beam") * (freeboard(ship) + 0.6 * house(ship)[0])
 
 
 def _lateral_area(ship: Particulars) -> float:
-    hull = ship.require("length_overall") * freeboard(ship)
-    return hull + house_area(ship)
+    _, area = house(ship)
+    return ship.require("length_overall") * freeboard(ship) + area
 
 
 def _lateral_centroid(ship: Particulars) -> float:
     full = ship.require("block_coefficient") >= 0.75
     house_at = -0.42 * ship.length if full else 0.0
-    return house_at * house_area(ship) / ship.require("lateral_area")
+    return house_at * house(ship)[1] / ship.require("lateral_area")
 
 
 def _centroid_height(ship: Particulars) -> float:
     deck = freeboard(ship)
     hull = ship.require("length_overall") * deck
-    house = house_area(ship)
-    middle_of_hull = 0.5 * deck
-    middle_of_house = deck + 0.5 * house_height(ship)
-    return (hull * middle_of_hull + house * middle_of_house) / (hull + house)
+    height, area = house(ship)
+    moment = hull * 0.5 * deck + area * (deck + 0.5 * height)
+    return moment / (hull + area)
 
 
 def _roll_period(ship: Particulars) -> float:

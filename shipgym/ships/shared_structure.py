@@ -130,7 +130,7 @@ class SharedStructure(Structure):
         self, axis: str, coefficients: Mapping[str, float], p: Particulars
     ) -> Floats:
         """Coefficient of each term of a force, that of the ship's mass included."""
-        force = {term.product: 0.0 for term in self.terms(axis)}
+        force = {term.product: 0.0 for term in self.equations[axis]}
         for share in self.shares[axis]:
             if share.acceleration is None:
                 value = coefficients[share.coefficient]

@@ -98,10 +98,6 @@ class Structure:
             names += self.names(equation)
         return names
 
-    def terms(self, equation: str) -> tuple[Term, ...]:
-        """Terms of one equation."""
-        return self.equations[equation]
-
     @cached_property
     def symbols(self) -> tuple[str, ...]:
         """Symbols that occur in its terms."""
@@ -198,7 +194,7 @@ class Structure:
         """
         values = self._symbol_values(channels, particulars, shaft_speed)
         columns = []
-        for term in self.terms(equation):
+        for term in self.equations[equation]:
             speed_power = self.speed_power(equation, term)
             column = values["U"] ** float(speed_power)
             for symbol, power in term.powers:

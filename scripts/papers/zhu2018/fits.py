@@ -204,7 +204,7 @@ def spline_fit(
     )
     samples = build_samples([trial], WITH_SPEED, ship.particulars, gear=ship.steering)
     accelerations = {
-        q: np.zeros(len(WITH_SPEED.terms(q))) for q in WITH_SPEED.regressed
+        q: np.zeros(len(WITH_SPEED.equations[q])) for q in WITH_SPEED.regressed
     }
     for q, chosen in columns.items():
         estimator = LSSVM(C=np.inf, fit_intercept=False)
