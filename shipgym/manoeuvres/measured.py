@@ -67,21 +67,23 @@ def measured_in_file(model: ShipModel) -> list[tuple[str, MeasuredIndex]]:
     table = provenance.get("measured", {})
     trials = [trial.get("name") for trial in provenance.get("trials", ())]
     where = f"{model.name}: provenance.measured"
-    known = [one.name for one in fields(MeasuredIndex)]
     found = list[tuple[str, MeasuredIndex]]()
     for trial, indices in check_table(table, where, trials).items():
-        names = check_table(indices, f"{where} {trial}", RULES)
-        for name, given in names.items():
-            own = f"{where} {trial} {name}"
-            values = check_table(given, own, known, known[:3])
-            value = check_number(values["value"], f"{own} value")
-            error = check_number(values["error"], f"{own} error", at_least=0.0)
-            side = check_choice(values["side"], ("starboard", "port"), f"{own} side")
-            predicted = values.get("predicted")
-            if predicted is not None:
-                check_number(predicted, f"{own} predicted")
-            found.append((name, MeasuredIndex(value, error, side, predicted)))
+        for name, given in check_table(indices, f"{where} {trial}", RULES).items():
+            found.append((name, _read_index(given, f"{where} {trial} {name}")))
     return found
+
+
+def _read_index(given: object, where: str) -> MeasuredIndex:
+    known = [one.name for one in fields(MeasuredIndex)]
+    values = check_table(given, where, known, known[:3])
+    value = check_number(values["value"], f"{where} value")
+    error = check_number(values["error"], f"{where} error", at_least=0.0)
+    side = check_choice(values["side"], ("starboard", "port"), f"{where} side")
+    predicted = values.get("predicted")
+    if predicted is not None:
+        check_number(predicted, f"{where} predicted")
+    return MeasuredIndex(value, error, side, predicted)
 
 
 def measured_indices(

@@ -79,17 +79,20 @@ def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
         row = wrong[0]
         at = {name: float(values[row]) for name, values in channels.items()}
         state = ", ".join(f"{name} = {value:.4g}" for name, value in at.items())
-        look = "for coefficients that are far too large"
-        if isinstance(model.dynamics, ShipEquations):
-            numbers = model.dynamics.numbers(
-                model.coefficients, model.particulars, model.service_shaft_speed
-            )
-            look = f"at {model.dynamics.fault(at, numbers.tolist(), ship_of(model))}"
         yield (
             f"derivatives: expected a number for the acceleration of '{rate}' at"
-            f" {state} (SI units), got {values[row]}; look {look}"
+            f" {state} (SI units), got {values[row]}; look {_where_to_look(model, at)}"
         )
         return
+
+
+def _where_to_look(model: ShipModel, at: dict[str, float]) -> str:
+    if not isinstance(model.dynamics, ShipEquations):
+        return "for coefficients that are far too large"
+    numbers = model.dynamics.numbers(
+        model.coefficients, model.particulars, model.service_shaft_speed
+    )
+    return f"at {model.dynamics.fault(at, numbers.tolist(), ship_of(model))}"
 
 
 def _run(model: ShipModel, rudder: float, lengths: float) -> Trial:
