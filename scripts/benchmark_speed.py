@@ -39,7 +39,6 @@ GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {
         *(partial(environments.weather, n) for n in (1024, 4096)),
         environments.kernel_ship,
         partial(environments.kernel_ship, centres=100),
-        environments.two_threads,
         *(partial(environments.native_against_python, task) for task in TASKS),
         *(partial(environments.native_against_cart_pole, task) for task in TASKS),
     ],

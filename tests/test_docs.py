@@ -55,7 +55,6 @@ SMALLER = {
     "range(20)": "range(2)",
     "range(1000)": "range(3)",
     "n_draws=200": "n_draws=3",
-    "threads=2": "threads=1",
     "seconds=35.0": "seconds=1.0",
     ".engine(100)": ".engine(3)",
     "(task.seeds)": "(task.seeds[:3])",

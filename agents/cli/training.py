@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 import sys
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -105,7 +104,6 @@ def train_command(
     *,
     asked: dict[str, Any],
     seed: Seed = 0,
-    threads: Annotated[int, Option(min=1, help="Threads for torch and the ships.")] = 1,
     resume: Annotated[
         bool, Option("--resume", help="Continue the run in the folder.")
     ] = False,
@@ -120,7 +118,7 @@ def train_command(
     """
     from agents.training.plan import make_plan
 
-    plan = make_plan(**asked, seed=seed, threads=threads)
+    plan = make_plan(**asked, seed=seed)
     _print_result(_train(plan, out, resume), out)
 
 
@@ -211,12 +209,12 @@ def tune_command(
 
 
 def print_tuning(study: Any, out: Path) -> None:
-    """Print the trials of a study and where the best settings are."""
-    from agents.cli.tables import number, plain_table
-    from agents.cli.terminal import answer, console, say
+    """Print the best trial of a study and where its settings are."""
+    from agents.cli.tables import number
+    from agents.cli.terminal import answer, say
     from agents.training.tuning import BEST
 
-    best = out / BEST
+    path, best = out / BEST, study.best_trial
     trials = [
         {
             "number": trial.number,
@@ -226,21 +224,12 @@ def print_tuning(study: Any, out: Path) -> None:
         }
         for trial in study.trials
     ]
-    answer({"trials": trials, "best": study.best_trial.number, "settings": str(best)})
-    title = "Trials by the mean cost of a held-out episode, best first"
-    table = plain_table(title, ">trial", ">cost", "ended", "what was varied")
-    for trial in sorted(trials, key=_rank):
-        varied = [f"{name} {value}" for name, value in trial["parameters"].items()]
-        table.add_row(
-            str(trial["number"]),
-            number(trial["cost"], 3),
-            trial["ended"],
-            ", ".join(varied) or "nothing: as it was",
-        )
-    console.print(table)
-    say(f"\nwritten: {best}")
-
-
-def _rank(trial: dict[str, Any]) -> float:
-    """Cost of a trial; those without one come last."""
-    return inf if trial["cost"] is None else float(trial["cost"])
+    answer({"trials": trials, "best": best.number, "settings": str(path)})
+    costs = [number(trial.value, 3) for trial in (best, study.trials[0])]
+    say(
+        f"lowest mean cost of a held-out episode: {costs[0]}, trial {best.number} of"
+        f" {len(trials)}; {costs[1]} with the settings as they were"
+    )
+    for name, value in best.params.items():
+        say(f"  {name} = {value}")
+    say(f"written: {path}")

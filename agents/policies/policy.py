@@ -31,9 +31,10 @@ from agents.controllers.memory import (
 )
 from agents.policies.network import Network, Numbers
 from agents.policies.policy_extraction import sb3_fields, task_showing
-from agents.policies.weights_file import Tensors, as_json, write_policy
+from agents.policies.weights_file import Tensors, write_policy
 from shipgym import InputError, ShipModel
 from shipgym.checks import check_choice, check_number, check_whole
+from shipgym.envs.episode import as_json
 from shipgym.envs.pace import NO_LIMIT, toward
 from shipgym.tasks.definition import read_definition
 from shipgym.tasks.task import ACTIONS, RUDDER_ORDERS, Task
@@ -44,7 +45,7 @@ OUTPUTS = {"rudder": 1, "rudder-discrete": len(RUDDER_ORDERS), "rudder-shaft": 2
 
 
 class PolicyMemory(NamedTuple):
-    """Memory of a policy of n ships; for a single ship without the first axis."""
+    """Memory of a policy of n ships; a single ship is a row too."""
 
     seen: (
         Numbers  # past observations, oldest first, (n, frame_stack - 1, n_observations)
@@ -55,8 +56,6 @@ class PolicyMemory(NamedTuple):
     in_force: Numbers  # the same, limited in rate, (n, n_outputs)
 
 
-#: Axes of the arrays of a memory, after those of the ships.
-WIDTHS = {"seen": 2, "left": 1, "output": 1, "in_force": 1}
 #: Fields of a policy that its file holds as they are.
 PLAIN = (
     "observation_names",
@@ -212,7 +211,7 @@ class LearnedPolicy:
             commands = self.commands(self.network(rows))
             return commands.reshape(*shape, commands.shape[1]), state
 
-        memory = self._recalled(state, episode_start, rows, tuple(shape))
+        memory = self._recalled(state, episode_start, rows)
         window = np.concatenate([memory.seen, rows[:, None]], axis=1)
         memory = memory._replace(seen=window[:, 1:])
         inputs = window.reshape(len(rows), -1)
@@ -234,7 +233,7 @@ class LearnedPolicy:
         if self.base is not None:
             base_state = self.base.after_order(base_state, commands)
             memory = memory._replace(base=base_state)
-        return commands, _shaped(memory, tuple(shape))
+        return commands, memory
 
     def _decided(self, inputs: Numbers, memory: PolicyMemory) -> PolicyMemory:
         """Ask the network for ships whose last output is over, or was not a number."""
@@ -268,11 +267,9 @@ class LearnedPolicy:
             action = combined(proposed, action, float(self.authority))
         return action
 
-    def _recalled(
-        self, state: Any, starts: Any, rows: Numbers, shape: tuple[int, ...]
-    ) -> PolicyMemory:
+    def _recalled(self, state: Any, starts: Any, rows: Numbers) -> PolicyMemory:
         """Memory of each ship; where an episode begins, the present fills the past."""
-        n, n_observed = rows.shape
+        n = len(rows)
         past = self.frame_stack - 1
         output = np.zeros((n, OUTPUTS[self.action]), dtype=np.float32)
         fresh = PolicyMemory(
@@ -284,20 +281,15 @@ class LearnedPolicy:
         )
         if state is None:
             return fresh
-        if not isinstance(state, PolicyMemory):
-            raise InputError(
-                "state: expected what the last predict returned, or None where episodes"
-                f" begin, got {type(state).__name__}"
-            )
-        checked_memory(state.seen, (*shape, past, n_observed))
-
-        begins = checked_starts(starts, (n,))
-        kept = _shaped(state, (n,))
-        for name, width in WIDTHS.items():
-            here = begins.reshape(n, *[1] * width)
-            array = np.where(here, getattr(fresh, name), getattr(kept, name))
-            kept = kept._replace(**{name: array})
-        return kept
+        checked_memory(state.seen, fresh.seen.shape)
+        begins = checked_starts(starts, (n,))[:, None]
+        return PolicyMemory(
+            seen=np.where(begins[:, None], fresh.seen, state.seen),
+            base=state.base,
+            left=np.where(begins, fresh.left, state.left),
+            output=np.where(begins, output, state.output),
+            in_force=np.where(begins, output, state.in_force),
+        )
 
     def check_fits(
         self, names: Sequence[str], scales: Sequence[float], where: str = "observations"
@@ -326,17 +318,14 @@ class LearnedPolicy:
         if "task" in self.env_options:
             return
         definition = read_definition(task_showing(self.observation_names))
-        known = {
+        options = {
             "action": self.action,
             "roll": "roll" in self.observation_names,
-            **self.env_options,
         }
-        options = {}
-        # Options of an environment that decide what is observed and in which scales.
-        showing = ("action", "roll", "corridor", "ground")
-        for name in Task.option_names(definition):
-            if name in showing and name in known:
-                options[name] = known[name]
+        # further options that decide in which scales is observed
+        for name in ("corridor", "ground"):
+            if name in self.env_options:
+                options[name] = self.env_options[name]
         task = Task.of(definition, **options)
         task.check_fits(model)
 
@@ -394,15 +383,6 @@ def check_part(agent: Any) -> None:
 def combined(proposed: Any, part: Any, authority: float) -> Any:
     """Action of a base and what a policy adds to it."""
     return np.clip(proposed + authority * part, -1.0, 1.0)
-
-
-def _shaped(memory: PolicyMemory, shape: tuple[int, ...]) -> PolicyMemory:
-    """Memory with other first axes: (n,) ships, or () for a single one."""
-    shaped = {}
-    for name, width in WIDTHS.items():
-        array = getattr(memory, name)
-        shaped[name] = array.reshape(*shape, *array.shape[-width:])
-    return memory._replace(**shaped)
 
 
 def order_numbers(action: ArrayLike) -> NDArray[np.int64]:

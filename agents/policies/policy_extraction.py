@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from agents.controllers.controller import Controller
 from agents.controllers.interface import model_hash
 from agents.policies.network import Layer, Network
-from agents.policies.weights_file import as_json
 from shipgym import InputError
 from shipgym.envs.environment import PACE
+from shipgym.envs.episode import as_json
 from shipgym.envs.pace import NO_LIMIT, Pace
 from shipgym.envs.registration import env_id
 from shipgym.tasks.definition import TASKS
@@ -165,7 +165,6 @@ def _options(keywords: Mapping[str, Any]) -> dict[str, Any]:
     running = (
         "model",
         "num_envs",
-        "threads",
         "autoreset_mode",
         "vectorization_mode",
         "render_mode",
@@ -198,10 +197,6 @@ def _network(agent: Any) -> Network:
         )
     activation = getattr(policy, "activation_fn", None)
     between = getattr(activation, "__name__", actor.activation)
-    if between not in ("ReLU", "Tanh"):
-        raise InputError(
-            f"agent: expected ReLU or Tanh between its layers, got {between}"
-        )
     dense = [one for one in modules[actor.body].modules() if hasattr(one, "weight")]
     if actor.head:
         dense.append(modules[actor.head])

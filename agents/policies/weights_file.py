@@ -5,16 +5,13 @@ not belong together are refused. No pickle, no torch.
 """
 
 import hashlib
-import json
 from collections.abc import Mapping
-from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
-from shipgym import InputError, ShipModel, Weather
+from shipgym import InputError
 from shipgym.files import LARGEST_TENSORS, read_bytes, write_bytes, write_json
 
 Tensors = dict[str, NDArray[Any]]
@@ -26,8 +23,7 @@ def write_policy(content: Mapping[str, Any], tensors: Tensors, path: Path) -> No
     """Write NAME.json and, first, NAME.safetensors.
 
     `content`: of the JSON; `tensors`: the weights; `path`: NAME.json. Raises InputError
-    if the name does not end in .json, the folder cannot be written, or JSON cannot hold
-    the content.
+    if the name does not end in .json, or the folder cannot be written.
     """
     from safetensors.numpy import save
 
@@ -36,13 +32,6 @@ def write_policy(content: Mapping[str, Any], tensors: Tensors, path: Path) -> No
             f"{path}: expected a name that ends in .json; the weights are written"
             " next to it, in .safetensors"
         )
-    try:
-        json.dumps(content, allow_nan=False)
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            f"{path}: training and env_options: expected what JSON can hold: {error}"
-        ) from None
-
     weights: bytes = save(tensors)
     sha256 = hashlib.sha256(weights).hexdigest()
     write_bytes(weights, weights_path(path))
@@ -57,7 +46,7 @@ def weights_path(path: Path) -> Path:
 def read_weights(path: Path, sha256: str) -> Tensors:
     """Weights by name, of the policy at `path` (NAME.json), whose JSON has their hash.
 
-    Raises InputError if they are missing, broken or those of another policy.
+    Raises InputError if they are missing, cut short or those of another policy.
     """
     from safetensors.numpy import load
 
@@ -70,35 +59,5 @@ def read_weights(path: Path, sha256: str) -> Tensors:
             f" {path}, got {found[:12]}... of {len(content)} bytes: cut short, or of"
             f" another policy; {REMEDY}"
         )
-    try:
-        tensors: Tensors = load(content)
-    except Exception as error:  # of safetensors, and of types that NumPy does not know
-        raise InputError(
-            f"{file}: expected a safetensors file, got one that is broken ({error});"
-            f" {REMEDY}"
-        ) from None
+    tensors: Tensors = load(content)
     return tensors
-
-
-def as_json(value: Any) -> Any:
-    """Convert an option of an environment to what JSON has; models to their names."""
-    match value:
-        case ShipModel():
-            return value.name
-        case Weather():
-            return value.to_dict()
-        case Path():
-            return str(value)
-        case Mapping():
-            return {str(name): as_json(entry) for name, entry in value.items()}
-        case list() | tuple():
-            return [as_json(entry) for entry in value]
-        case np.ndarray() | np.generic():
-            return as_json(value.tolist())
-        case float() if np.isnan(value):
-            return None
-        case float() if np.isinf(value):
-            return str(value)
-    if is_dataclass(value) and not isinstance(value, type):
-        return as_json(asdict(value))
-    return value

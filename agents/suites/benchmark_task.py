@@ -180,7 +180,6 @@ class BenchmarkTask:
         self,
         num_envs: int,
         model: ShipModel | None = None,
-        threads: int = 1,
         on: str = "model",
     ) -> Engine:
         """Return many ships at once in a set of its episodes, by default the model."""
@@ -192,7 +191,6 @@ class BenchmarkTask:
             num_envs,
             task,
             randomisation,
-            threads=threads,
         )
 
     @property

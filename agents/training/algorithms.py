@@ -53,7 +53,6 @@ def make_ships(plan: TrainingPlan, base: Controller | None) -> VecEnv:
         plan.task.env_id,
         settings.ships,
         model=plan.task.ship,
-        threads=plan.threads,
         **options,
     )
     if base is not None:

@@ -21,10 +21,8 @@ class HeldOut:
     on the task's ship, which follows paths by the course that the task shows.
     """
 
-    def __init__(
-        self, task: BenchmarkTask, first: int, number: int, threads: int = 1
-    ) -> None:
-        self.engine = task.engine(number, threads=threads)
+    def __init__(self, task: BenchmarkTask, first: int, number: int) -> None:
+        self.engine = task.engine(number)
         self.seeds = first + np.arange(number)
         self.costs = {name: self.cost(one) for name, one in yardsticks(task).items()}
 

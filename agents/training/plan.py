@@ -1,14 +1,12 @@
 """The plan of a training: what is learned, and with which settings."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from agents.controllers.interface import model_hash
 from agents.policies.policy import OUTPUTS
-from agents.policies.weights_file import as_json
 from agents.suites.environments import SHORT_NAMES, read_environment
 from agents.suites.suite import BenchmarkTask, find_task
 from agents.training.settings import (
@@ -20,11 +18,8 @@ from agents.training.settings import (
 )
 from agents.training.yardsticks import half_reward_cost
 from shipgym.checks import check_choice, check_whole
+from shipgym.envs.episode import as_json
 from shipgym.errors import InputError
-from shipgym.models import ShipModel
-from shipgym.sea.conditions import Weather, as_weather
-from shipgym.sea.weather_column import weather_column
-from shipgym.tasks.task import Task
 
 #: Seeds below those that are scored: of training a thousand for each `seed`, then those
 #: held out.
@@ -48,26 +43,15 @@ class TrainingPlan:
         Of the algorithm.
     seed : int
         0 to 799, of networks, exploration and the ships' episodes.
-    threads : int
-        Of torch and of the loops over ships.
     """
 
     algorithm: str
     task: BenchmarkTask
     settings: LearningSettings
     seed: int = 0
-    threads: int = 1
 
     def __post_init__(self) -> None:
         check_whole(self.seed, "seed", at_least=0, at_most=799)
-        check_whole(self.threads, "threads", at_least=1, at_most=1024)
-        check_whole(
-            self.settings.action_repeat,
-            "action_repeat",
-            at_least=1,
-            at_most=self.task.task.episode_steps,
-            hint="no longer than an episode",
-        )
         self.task.task.check_fits(self.task.ship)
         action = check_choice(self.task.task.action, OUTPUTS, "action")
         if action == "rudder-discrete" and self.algorithm != "ppo":
@@ -112,7 +96,6 @@ def make_plan(
     settings_file: Path | None = None,
     settings: Mapping[str, Any] | None = None,
     seed: int = 0,
-    threads: int = 1,
 ) -> TrainingPlan:
     """Make the plan of a training.
 
@@ -136,7 +119,7 @@ def make_plan(
         TOML.
     settings : mapping, optional
         Settings by name; they go before the file.
-    seed, threads : int
+    seed : int
         As in `TrainingPlan`.
     """
     settings_of(algorithm)  # its error goes before those of the task
@@ -166,7 +149,7 @@ def make_plan(
         learned.suite,
         given={**own, **(settings or {})},
     )
-    return TrainingPlan(algorithm, learned, chosen, seed, threads)
+    return TrainingPlan(algorithm, learned, chosen, seed)
 
 
 def _task(
@@ -188,20 +171,15 @@ def training_options(plan: TrainingPlan) -> dict[str, Any]:
 
     They earn what the setting `reward` says, unless the task's options do; in a task of
     a user's file the bounded reward has the scale of its costs (`half_reward_cost`).
-    The setting `randomise` draws ships from the model's covariance, where it has one;
-    `all` also an approach speed of 0.8 to 1.1 times the service speed, and one of the
-    sea states that the ship's particulars allow, with the current of the task's own.
+    The setting `randomise` draws ships from the model's covariance, where it has one.
     """
     task = plan.task
     options = task.arguments
     if "bounded" not in options:
         options["bounded"] = _bounded(plan)
-    randomise = plan.settings.randomise
-    if randomise != "none" and task.ship.covariance is not None:
+    drawn = plan.settings.randomise == "covariance"
+    if drawn and task.ship.covariance is not None:
         options.setdefault("model_uncertainty", "covariance")
-    if randomise == "all":
-        options.setdefault("speed_range", (0.8, 1.1))
-        options["sea"] = _seas(task.task, task.ship)
     return options
 
 
@@ -211,22 +189,6 @@ def _bounded(plan: TrainingPlan) -> bool | float:
         return plan.settings.reward == "bounded"
     seeds = range(plan.training_seed, plan.training_seed + 50)
     return half_reward_cost(plan.task, seeds)
-
-
-def _seas(task: Task, ship: ShipModel) -> list[Weather]:
-    """Return the seas of a task, and the other sea states that its ship allows."""
-    seas = list(task.seas)
-    known = {sea.name for sea in seas}
-    substep = task.substep(ship)
-    for name in ("calm", "slight", "moderate", "rough"):
-        if name in known:
-            continue
-        sea = as_weather(name, "sea", None)
-        with_current = replace(sea, current=task.weather.current)
-        with suppress(InputError):
-            weather_column(ship, with_current, substep, task.water_depth)
-            seas.append(with_current)
-    return seas
 
 
 def check_same(

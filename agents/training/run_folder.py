@@ -32,11 +32,14 @@ def check_new(folder: Path) -> None:
             f"{folder}: contains a run already; resume it with --resume, or name"
             " another folder"
         )
-    if folder.exists() and (not folder.is_dir() or present(folder)):
-        raise InputError(
-            f"{folder}: exists and is not a training run; name another folder"
-        )
+    check_empty(folder, "training run")
     check_writable(folder)
+
+
+def check_empty(folder: Path, what: str) -> None:
+    """Refuse a folder that holds something else than `what`."""
+    if folder.exists() and (not folder.is_dir() or present(folder)):
+        raise InputError(f"{folder}: exists and is not a {what}; name another folder")
 
 
 def begin_folder(folder: Path, plan: TrainingPlan, command: str) -> None:

@@ -81,11 +81,10 @@ class LearningSettings(Settings):
         at_most=2.0,
     )
     randomise: str = setting(
-        "covariance: the ships that learn are drawn from the model's covariance; all:"
-        " approach speeds and sea states are drawn too. Evaluation is on the task as it"
-        " is",
+        "covariance: the ships that learn are drawn from the model's covariance."
+        " Evaluation is on the task as it is",
         "none",
-        options=("none", "covariance", "all"),
+        options=("none", "covariance"),
     )
 
     ships: int = setting("ships that sail at once", at_least=1, at_most=SEEDS_EACH)

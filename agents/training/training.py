@@ -92,7 +92,7 @@ def train(
                 run_folder.check_resumable(folder, plan)
             else:
                 run_folder.check_new(folder)
-        stack.enter_context(_torch_threads(plan.threads))
+        stack.enter_context(_one_thread())
         run = _Run(plan, folder, evaluation_episodes, save_seconds)
         run.on_progress = on_progress
         if folder is not None and resume:
@@ -119,7 +119,7 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
         self.plan = plan
         self.folder = folder
         self.save_seconds = save_seconds
-        self.held_out = HeldOut(plan.task, EVALUATION_SEED, episodes, plan.threads)
+        self.held_out = HeldOut(plan.task, EVALUATION_SEED, episodes)
         self.agent = make_agent(plan, design_base(plan.settings.base, plan.task))
         log = []
         if folder is not None and find_spec("tensorboard"):
@@ -291,11 +291,7 @@ def _replay(agent: Any) -> dict[str, Any] | None:
     if buffer is None:
         return None
     filled = buffer.buffer_size if buffer.full else buffer.pos
-    tensors = {}
-    for name in REPLAY:
-        array = getattr(buffer, name)
-        tensors[name] = torch.from_numpy(array[:filled])
-    return tensors
+    return {name: torch.from_numpy(getattr(buffer, name)[:filled]) for name in REPLAY}
 
 
 def _restore(agent: Any, content: dict[str, Any]) -> None:
@@ -317,9 +313,10 @@ def _restore(agent: Any, content: dict[str, Any]) -> None:
 
 
 @contextmanager
-def _torch_threads(number: int) -> Iterator[None]:
+def _one_thread() -> Iterator[None]:
+    """Keep torch to one thread: small networks are no faster with more."""
     before = torch.get_num_threads()
-    torch.set_num_threads(number)
+    torch.set_num_threads(1)
     try:
         yield
     finally:

@@ -11,9 +11,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from agents.output import in_use, present
+from agents.output import in_use
 from agents.training.evaluation import TrainingProgress
 from agents.training.plan import TrainingPlan, check_same
+from agents.training.run_folder import check_empty
 from agents.training.settings import suggested
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
@@ -58,49 +59,40 @@ def tune(
     """
     check_whole(trials, "trials", at_least=1)
     every = max(1, plan.settings.total_steps // EVALUATIONS)
-    settings = plan.settings.changed({"evaluate_every": every})
-    plan = replace(plan, settings=settings)
+    plan = replace(plan, settings=plan.settings.changed({"evaluate_every": every}))
     folder = Path(out)
-    diverged: list[InputError] = []
 
     def objective(trial: Any) -> float:
         settings = plan.settings
         if trial.number > 0:
             settings = suggested(settings, trial, fixed)
         trial.set_user_attr("settings", settings.to_dict())
-        try:
-            return lowest_cost(replace(plan, settings=settings), trial)
-        except InputError as error:
-            diverged.append(error)
-            raise
+        return lowest_cost(replace(plan, settings=settings), trial)
 
     def after(study: Any, trial: Any) -> None:
-        if _finished(study) and study.best_trial.number == trial.number:
+        finished = trial.state is optuna.trial.TrialState.COMPLETE
+        if finished and study.best_trial.number == trial.number:
             _write_best(folder, plan, trial)
         if on_progress is not None:
             on_progress(_ended(study), trials)
 
     with in_use(folder):
         study = open_study(folder, plan, fixed)
-        study.optimize(
-            objective,
-            n_trials=max(0, trials - _ended(study)),
-            catch=InputError,
-            callbacks=[after],
+        left = max(0, trials - _ended(study))
+        study.optimize(objective, left, catch=InputError, callbacks=[after])
+    if not (folder / BEST).is_file():
+        raise InputError(
+            "tune: expected a trial that does not diverge, got none; lower"
+            " learning_rate, or raise reward_scale"
         )
-        if not _finished(study):
-            raise InputError(f"every trial diverged, the last: {diverged[-1]}")
-        return study
+    return study
 
 
 def open_study(folder: Path, plan: TrainingPlan, fixed: Collection[str] = ()) -> Any:
     """Open the study in a folder, or begin one; InputError if it is another."""
     path = folder / STUDY
     if not path.is_file():
-        if folder.exists() and (not folder.is_dir() or present(folder)):
-            raise InputError(
-                f"{folder}: exists and is not a tuning study; name another folder"
-            )
+        check_empty(folder, "tuning study")
         make_folder(folder)
     study = optuna.create_study(
         storage=f"sqlite:///{path}",
@@ -109,13 +101,10 @@ def open_study(folder: Path, plan: TrainingPlan, fixed: Collection[str] = ()) ->
         pruner=optuna.pruners.MedianPruner(4, n_warmup_steps=EVALUATIONS // 4),
     )
     configuration = {**plan.configuration(), "fixed": sorted(fixed)}
-    check_same(
-        configuration, study.user_attrs.get("configuration", configuration), str(path)
-    )
-    study.set_user_attr("configuration", configuration)
-    study.sampler = optuna.samplers.TPESampler(
-        seed=plan.seed + len(study.trials), n_startup_trials=4
-    )
+    check_same(configuration, study.user_attrs.get("plan", configuration), str(path))
+    study.set_user_attr("plan", configuration)
+    seed = plan.seed + len(study.trials)
+    study.sampler = optuna.samplers.TPESampler(n_startup_trials=4, seed=seed)
     return study
 
 
@@ -128,11 +117,10 @@ def lowest_cost(plan: TrainingPlan, trial: Any) -> float:
     from agents.training.training import train
 
     def report(now: TrainingProgress) -> None:
-        if not now.evaluated or now.steps == 0:
-            return
-        trial.report(now.cost, now.steps // plan.settings.evaluate_every)
-        if trial.should_prune():
-            raise optuna.TrialPruned
+        if now.evaluated and now.steps > 0:
+            trial.report(now.cost, now.steps // plan.settings.evaluate_every)
+            if trial.should_prune():
+                raise optuna.TrialPruned
 
     result = train(plan, on_progress=report)
     return min(float(one["cost"]) for one in result.curve if one["steps"] > 0)
@@ -143,18 +131,12 @@ def _ended(study: Any) -> int:
     return sum(trial.state.is_finished() for trial in study.trials)
 
 
-def _finished(study: Any) -> list[Any]:
-    """Trials that were neither stopped early nor diverged."""
-    finished: list[Any] = study.get_trials(states=[optuna.trial.TrialState.COMPLETE])
-    return finished
-
-
 def _write_best(folder: Path, plan: TrainingPlan, trial: Any) -> None:
     """Write the settings of the best trial; evaluations were for tuning only."""
-    task = plan.task
+    task = plan.task.name or plan.task.environment
     lines = [
         f"# Trial {trial.number}: mean cost held out {trial.value:.6g},"
-        f" {plan.algorithm} on {task.name or task.environment} with {task.model}.",
+        f" {plan.algorithm} on {task} with {plan.task.model}.",
         f"# shipgym train {plan.algorithm} --settings {BEST} ...",
         "",
     ]

@@ -97,7 +97,7 @@ def keep_track(guide: Controller, models: Sequence[ShipModel]) -> Track:
     return Track(
         key=guide.kind,
         controller=guide,
-        waypoints=np.reshape(task.settings.waypoints[1:], (-1, 2)),
+        waypoints=np.reshape(task.settings.waypoints, (-1, 2)),
         positions=np.column_stack([x, y]),
         cross_track=cross_track,
         largest=_largest_error(run),

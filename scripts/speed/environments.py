@@ -144,21 +144,6 @@ def vector_environment(task: str, n_envs: int, aim: str) -> Row:
     )
 
 
-def two_threads(n_envs: int = 16384) -> Row:
-    """Two threads against one, by the clock on the wall: needs two idle cores."""
-    one, two = (
-        vector_speed(n_envs, clock=time.perf_counter, threads=threads)
-        for threads in (1, 2)
-    )
-    return Row(
-        f"CourseKeeping, {n_envs} at once, two threads",
-        f"{two / 1e6:.1f} M steps/s",
-        f"one thread {one / 1e6:.1f} M steps/s",
-        two / one,
-        "1.7 times",
-    )
-
-
 def weather(n_envs: int) -> Row:
     """A native vector environment with current, wind and waves, against calm water."""
     sea = Weather(

@@ -2,7 +2,6 @@
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
 from functools import partial
 from typing import Any, ClassVar, NoReturn
 
@@ -52,8 +51,6 @@ class Engine(Lanes):
         Variation from episode to episode; only with one ship for all.
     allow_unstable : bool
         Whether a model that was found unstable when it was identified may be used.
-    threads : int
-        Number of threads that share the lanes; the results do not depend on it.
     loop : callable, optional
         Makes the loop that steps the ships; by default it is compiled.
     scale_task : Task, optional
@@ -77,13 +74,11 @@ class Engine(Lanes):
         task: Task | None = None,
         randomisation: Randomisation | None = None,
         allow_unstable: bool = False,
-        threads: int = 1,
         loop: Callable[[EpisodeProgram], Any] | None = None,
         scale_task: Task | None = None,
         cut_off: float = np.inf,
     ) -> None:
         check_whole(num_envs, "num_envs", at_least=1)
-        check_whole(threads, "threads", at_least=1)
         ships = [models] if isinstance(models, ShipModel) else list(models)
         _check_ships(ships, num_envs, allow_unstable)
         model = ships[0]
@@ -97,7 +92,6 @@ class Engine(Lanes):
             num_envs,
             randomisation=randomisation,
             allow_unstable=allow_unstable,
-            threads=threads,
             scale_task=scale_task,
             cut_off=cut_off,
         )
@@ -122,7 +116,7 @@ class Engine(Lanes):
             task.checked,
         )
         contents = Contents(own, drawn, scale_task, cut_off)
-        super().__init__(program, model, task, num_envs, contents, threads)
+        super().__init__(program, model, task, num_envs, contents)
         self._begin_all(loop or self._compiled)
 
     def _begin_all(self, loop: Callable[[EpisodeProgram], Any]) -> None:
@@ -130,8 +124,6 @@ class Engine(Lanes):
         self._orders = self._actions.T
         self.all_lanes = np.ones(self.num_envs, dtype=np.bool_)
         self.all_lanes.flags.writeable = False
-        # threads start when there is a share for them
-        self._threads = ThreadPoolExecutor(max(self.n_shares - 1, 1), "shipgym")
         self.renew_outputs()
         # last, when no input is left that may be refused
         self._run = loop(self.program)
@@ -169,12 +161,7 @@ class Engine(Lanes):
             if fault := fault_in_python(self.model, self.task):
                 raise InputError(fault)
             _TRIED.add(program)
-        try:
-            run = entry_of(program.run)
-        except InputError as error:
-            # plain Python often has the better message
-            fault = fault_in_python(self.model, self.task)
-            raise InputError(fault or str(error)) from None
+        run = entry_of(program.run)
         task = program.task
         cost = asked(task.worst_cost, self.task.settings)
         where = f"{task.reward_source}: worst_cost"
@@ -206,11 +193,8 @@ class Engine(Lanes):
         if anew:
             self.renew_outputs()
         asked = STEP_AND_BEGIN if begin_ended else STEP
-        step: Callable[[], int] = partial(self._run_shares, asked)
-        if self.n_shares == 1:
-            step = partial(self._run, self._memory, self.outputs.memory, 0, asked)
-        n_ended = step()
-        if n_ended < 0:  # `REFUSED`, in every share
+        n_ended: int = self._run(self._memory, self.outputs.memory, 0, asked)
+        if n_ended < 0:  # `REFUSED`
             self.outputs = before
             self._refuse_orders()
         return n_ended
@@ -224,21 +208,6 @@ class Engine(Lanes):
         raise InputError(
             f"actions: expected numbers in [-1, 1], got {found} in lane {lane}"
         )
-
-    def _run_shares(self, asked: int) -> int:
-        """Let threads step their shares of the ships."""
-        run = partial(self._run, self._memory, self.outputs.memory)
-        others = []
-        for share in range(1, self.n_shares):
-            others.append(self._threads.submit(run, share, asked))
-        # the first share is this thread's, which would wait for the others otherwise
-        try:
-            n_ended: int = run(0, asked)
-        finally:
-            wait(others)  # none goes on while an error is told
-        for other in others:
-            n_ended += other.result()
-        return n_ended
 
     def step_of_one(self) -> Callable[[], int]:
         """Return the step of an engine of one lane, whose arrays stay the same.

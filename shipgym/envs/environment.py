@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import copy
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -19,8 +20,6 @@ from shipgym.checks import (
     check_flag,
     check_keys,
     check_whole,
-    did_you_mean,
-    quoted,
     unexpected,
 )
 from shipgym.envs.engine import Engine, as_array, episode_key
@@ -35,9 +34,7 @@ from shipgym.tasks.task import Task
 if TYPE_CHECKING:
     from shipgym.envs.rendering import Artist
 
-Space = (
-    gymnasium.spaces.Box | gymnasium.spaces.Discrete | gymnasium.spaces.MultiDiscrete
-)
+Space = gymnasium.spaces.Box | gymnasium.spaces.Discrete
 DEFAULT_MODEL = "mariner-tls-svm"
 DEFAULT_TASK = "CourseKeeping"
 LONGEST = "max_episode_steps"  # keyword of vector environments
@@ -46,25 +43,9 @@ KEPT = ("_keys", "_frames", "_over", "_some_over")
 PACE = ("action_repeat", "rate_limit", "frame_stack")  # keywords that make a `Pace`
 
 
-class UnknownKeywordError(InputError, TypeError):
-    """Error for a keyword that an environment does not take.
-
-    It is a TypeError, because libraries probe for keywords by catching one.
-    """
-
-    def __init__(self, message: str, known: Sequence[str] = ()) -> None:
-        if known:  # raised again by Gymnasium, it has the message alone
-            hint = did_you_mean(message, known)
-            message = (
-                f"environment options: unknown key '{message}'.{hint} Known keys:"
-                f" {quoted(known)}; it is an unexpected keyword argument '{message}'"
-            )
-        super().__init__(message)
-
-
 def read_options(
     task: Any,
-    model: str | Path | ShipModel,
+    model: str | Path | ShipModel | Mapping[str, Any],
     options: Mapping[str, Any],
     taken: Sequence[str] = (),
 ) -> tuple[ShipModel, Task, Randomisation]:
@@ -79,13 +60,12 @@ def read_options(
         sensors = read_sensors(sensors)
     own = Task.option_names(definition, sensors)
     known = dict.fromkeys([*taken, "reward", *own, *Randomisation.names()])
-    for name in options:
-        if name not in known:
-            raise UnknownKeywordError(name, list(known))
-
+    check_keys(options, known, "environment options")
     randomisation, rest = Randomisation.take_from(options)
     rest.pop("reward", None)
-    if not isinstance(model, str | Path | ShipModel):
+    if isinstance(model, Mapping):  # of a spec that was written as JSON
+        model = ShipModel.from_dict(model)
+    elif not isinstance(model, str | Path | ShipModel):
         raise unexpected(
             "model", "a name, the path of a model file, or a ShipModel", model
         )
@@ -102,46 +82,49 @@ def spaces(task: Task, model: ShipModel, frame_stack: int = 1) -> tuple[Any, Spa
         low = np.tile(low, (frame_stack, 1))
         high = np.tile(high, (frame_stack, 1))
     observations = gymnasium.spaces.Box(low, high, dtype=np.float32)
-    counts = [len(orders) for orders in task.orders(model)]
-    if len(counts) == 1:
-        return observations, gymnasium.spaces.Discrete(counts[0])
-    if counts:
-        return observations, gymnasium.spaces.MultiDiscrete(counts)
+    if task.orders:
+        return observations, gymnasium.spaces.Discrete(len(task.orders))
     shape = (task.n_commands,)
     return observations, gymnasium.spaces.Box(-1.0, 1.0, shape, dtype=np.float32)
 
 
 def given_orders(
-    orders: Sequence[NDArray[np.float32]],
+    orders: NDArray[np.float32],
     numbers: Any,
     space: gymnasium.Space[Any],
     where: str,
 ) -> NDArray[np.float32]:
-    """Discrete orders by their numbers, a column for each command.
+    """Rudder orders by their numbers, shape (n, 1).
 
     InputError for numbers that are not in the action space.
     """
     array = as_array(numbers)
     if array not in space:
-        kind = "rudder orders" if len(orders) == 1 else "orders of rudder and shaft"
-        raise unexpected(where, f"a member of {space}: {kind}", numbers)
-    columns = array.reshape(-1, len(orders)).T
-    ordered = [known[chosen] for known, chosen in zip(orders, columns, strict=True)]
-    return np.stack(ordered, axis=-1)
+        raise unexpected(where, f"a member of {space}: rudder orders", numbers)
+    ordered: NDArray[np.float32] = orders[array.reshape(-1, 1)]
+    return ordered
 
 
 class ShipSpec(EnvSpec):
     """Registration of an environment of shipgym."""
 
     def to_json(self) -> str:
-        """Return the registration as JSON; InputError with a model that has no file."""
-        model = self.kwargs.get("model")
-        if isinstance(model, ShipModel):
-            raise InputError(
-                "spec: model: expected a name or the path of a model file, which JSON"
-                f" can hold, got a ShipModel, {model.name!r}; save it and give its path"
-            )
-        return super().to_json()
+        """Return the registration as JSON, with models and seas by their content.
+
+        Raises InputError for a keyword that JSON cannot hold.
+        """
+        kwargs = json.loads(json.dumps(self.kwargs, default=_content))
+        return EnvSpec.to_json(replace(self, kwargs=kwargs))
+
+
+def _content(value: Any) -> Any:
+    """Content of a keyword that is an object; InputError if JSON cannot hold it."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if not hasattr(value, "to_dict"):
+        expected = "keywords that JSON can hold, models and weather"
+        raise unexpected("spec", expected, value, "give its name or path")
+    return value.to_dict()
 
 
 class ShipsEnv:
@@ -204,7 +187,6 @@ class ShipsEnv:
             self.task,
             self.randomisation,
             allow_unstable=given["allow_unstable"],
-            threads=given.get("threads", 1),
             cut_off=np.inf if longest == -1 else longest * self.pace.action_repeat,
         )
         self._asked: dict[str, Any] = {}
@@ -224,10 +206,7 @@ class ShipsEnv:
         depth = self.pace.frame_stack
         if depth > 1:
             self._frames = Frames(num_envs, depth, len(observed))
-        # of each command of a discrete action
-        self._orders: list[NDArray[np.float32]] = []
-        for orders in self.task.orders(self.model):
-            self._orders.append(np.array(orders, dtype=np.float32))
+        self._orders = np.array(self.task.orders, dtype=np.float32)
         self.pace.check_reaches(self._orders)
 
     @property

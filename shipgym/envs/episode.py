@@ -4,7 +4,7 @@ Its file is JSON: `format`, `kind` ("episode") and the fields of `Episode`.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any, Self
 
@@ -27,6 +27,7 @@ from shipgym.checks import (
 )
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
+from shipgym.models import ShipModel
 from shipgym.tasks.guidance import Path as PlannedPath
 from shipgym.tasks.guidance import track
 from shipgym.trials.trial import Trial
@@ -115,16 +116,15 @@ class Episode:
         check_whole(self.number, "number", at_least=0)
         if self.seed is not None:
             check_whole(self.seed, "seed", at_least=0)
-        for name in ("terminated", "truncated", "success"):
-            if name != "success" or self.success is not None:
-                check_flag(getattr(self, name), name)
+        for name in ("terminated", "truncated"):
+            check_flag(getattr(self, name), name)
+        if self.success is not None:
+            check_flag(self.success, "success")
         largest = {"rudder_limit": np.pi / 2.0, "beam": self.length}
         for name in ("dt", "length", *largest, "corridor", "turn_radius"):
             value = getattr(self, name)
-            is_optional = name in ("beam", "corridor", "turn_radius")
-            if not is_optional or value is not None:
-                at_most = largest.get(name)
-                self._set(name, check_number(value, name, above=0.0, at_most=at_most))
+            if value is not None or name in ("dt", "length", "rudder_limit"):
+                check_number(value, name, above=0.0, at_most=largest.get(name))
         self._set_series()
         if self.waypoints is not None:
             path = PlannedPath(self.waypoints)
@@ -204,9 +204,7 @@ class Episode:
 
     def save(self, path: str | Path) -> None:
         """Write the episode as JSON, atomically; InputError where that fails."""
-        content: dict[str, Any] = {"format": FORMAT, "kind": KIND}
-        for name, value in vars(self).items():
-            content[name] = _listed(value)
+        content = {"format": FORMAT, "kind": KIND, **vars(self)}
         write_json(content, Path(path), indent=None)
 
     @classmethod
@@ -237,8 +235,25 @@ def _series(values: ArrayLike, where: str, shape: tuple[int, ...]) -> Floats:
     return array
 
 
-def _listed(value: Any) -> Any:
-    """Arrays as lists, also within a mapping."""
-    if isinstance(value, Mapping):
-        return {key: _listed(entry) for key, entry in value.items()}
-    return value.tolist() if isinstance(value, np.ndarray) else value
+def as_json(value: Any) -> Any:
+    """Convert an argument of an environment to what JSON has; models to their names."""
+    match value:
+        case ShipModel():
+            return value.name
+        case Mapping():
+            return {str(name): as_json(entry) for name, entry in value.items()}
+        case list() | tuple():
+            return [as_json(entry) for entry in value]
+        case np.ndarray() | np.generic():
+            return as_json(value.tolist())
+        case float() if np.isnan(value):
+            return None
+        case float() if np.isinf(value):
+            return str(value)
+        case None | bool() | int() | float() | str():
+            return value
+    if hasattr(value, "to_dict"):  # of weather
+        return as_json(value.to_dict())
+    if is_dataclass(value) and not isinstance(value, type):
+        return as_json(asdict(value))
+    return str(value)

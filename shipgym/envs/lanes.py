@@ -44,8 +44,6 @@ class Lanes:
     task : Task
     num_envs : int
     contents : Contents
-    threads : int
-        That share the lanes.
     """
 
     outputs: Outputs  # of the last step
@@ -57,7 +55,6 @@ class Lanes:
         task: Task,
         num_envs: int,
         contents: Contents,
-        threads: int,
     ) -> None:
         self.program = program
         self.model = model
@@ -69,12 +66,10 @@ class Lanes:
         self._output_pool = self._pool_of_outputs()
 
         n_tiles = -(-num_envs // LANES)
-        shares = lane_shares(n_tiles, threads)
-        self.n_shares = len(shares)
         tables = self._allocate(
             **self._filled_tables(contents, n_tiles),
             settings=np.array([self._settings(contents.cut_off)]),
-            shares=shares,
+            shares=np.array([[0, n_tiles]]),
             **self._empty_tables(n_tiles),
             **self._output_rows(),
         )
@@ -118,7 +113,7 @@ class Lanes:
         return {
             "states": np.zeros((n_tiles, n_state * LANES)),
             "random": np.zeros((n_tiles, n_random * LANES), dtype=np.uint64),
-            "results": np.zeros((self.n_shares, n_results * LANES)),
+            "results": np.zeros((1, n_results * LANES)),
             "actions": np.zeros(
                 (self.task.n_commands, self.num_envs),
                 dtype=np.float32,
@@ -331,13 +326,6 @@ def bridge_noise(multiple: float) -> dict[str, float]:
         noise[name] = multiple * SEA_TRIAL[channel].noise
     noise["ground"] = multiple * 0.05  # m/s, of a satellite receiver
     return noise
-
-
-def lane_shares(tiles: int, threads: int) -> NDArray[np.int64]:
-    """First tile of each thread, and that behind its last, shape (n_shares, 2)."""
-    n_shares = min(threads, tiles)
-    ends = np.linspace(0, tiles, n_shares + 1).astype(np.int64)
-    return np.stack([ends[:-1], ends[1:]], axis=1)
 
 
 def ship_columns(

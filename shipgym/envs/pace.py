@@ -1,6 +1,5 @@
 """Pace of an agent: intervals of a step, rate of its commands, observations it sees."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -51,20 +50,19 @@ class Pace:
                 hint="parts of the limit in a control interval, or None",
             )
 
-    def check_reaches(self, orders: Sequence[Float32]) -> None:
+    def check_reaches(self, orders: Float32) -> None:
         """Refuse a rate at which a step does not reach the next discrete order."""
-        if self.rate_limit is None:
+        if self.rate_limit is None or len(orders) == 0:
             return
         reach = self.action_repeat * self.rate_limit
-        for known in orders:
-            gap = float(np.diff(np.sort(known)).max())
-            if reach < gap - 1e-6:
-                raise InputError(
-                    f"rate_limit: expected at least {gap / self.action_repeat:g} with"
-                    f" discrete orders that are up to {gap:g} apart, got"
-                    f" {self.rate_limit:g}, which reaches {reach:g} in a step; raise it"
-                    " or action_repeat, or choose a continuous action"
-                )
+        gap = float(np.diff(orders).max())
+        if reach < gap - 1e-6:
+            raise InputError(
+                f"rate_limit: expected at least {gap / self.action_repeat:g} with"
+                f" discrete orders that are up to {gap:g} apart, got"
+                f" {self.rate_limit:g}, which reaches {reach:g} in a step; raise it"
+                " or action_repeat, or choose a continuous action"
+            )
 
 
 class PacedSteps:

@@ -1,6 +1,6 @@
 """Episodes in plain Python that check results of functions of task and sensors."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from numbers import Integral, Real
 from traceback import walk_tb
@@ -105,46 +105,34 @@ def _fault(given: Any, form: Any, name: str) -> str:
 
     A form is a record, float, bool, or a tuple of forms.
     """
-    names: list[str] = []
-    if isinstance(form, tuple):
-        names = [f"result {k + 1}" for k in range(len(form))]
-    if is_array(form):
-        form = get_args(form)
-        names = [f"{name}[{k}]" for k in range(len(form))]
-    if isinstance(form, tuple):
-        if not isinstance(given, tuple) or len(given) != len(form):
-            return _other(given, form, name)
-        return _fault_within(given, form, names)
-    if is_record(form):
-        if type(given) is not form:
-            return _other(given, form, name)
-        record: Record = form
-        kinds = []
-        for field, kind in members(record):
-            kinds.append(kind if members(kind) else float)
-            names.append(f"{record.__name__}.{field}")
-        return _fault_within(given, kinds, names)
-    numbers = Integral if form is bool else Real
-    if isinstance(given, np.bool_ | numbers):
-        return ""
-    return _other(given, form, name)
-
-
-def _other(given: Any, form: Any, name: str) -> str:
-    return f"{name}: expected {_words(form)}, got {_words(given)}"
-
-
-def _fault_within(
-    given: Sequence[Any],
-    forms: Sequence[Any],
-    names: Sequence[str],
-) -> str:
-    """Say where the first of several values differs from its form; empty if none."""
-    for value, form, name in zip(given, forms, names, strict=True):
-        fault = _fault(value, form, name)
-        if fault:
+    parts = _parts(form, name)
+    if parts:
+        kind = form if is_record(form) else tuple
+        fits = isinstance(given, kind) and len(given) == len(parts)
+    else:
+        fits = isinstance(given, np.bool_ | (Integral if form is bool else Real))
+    if not fits:
+        words = get_args(form) if is_array(form) else form
+        return f"{name}: expected {_words(words)}, got {_words(given)}"
+    for k, (place, inner) in enumerate(parts):
+        if fault := _fault(given[k], inner, place):
             return fault
     return ""
+
+
+def _parts(form: Any, name: str) -> list[tuple[str, Any]]:
+    """Places within a form, and their forms; none for a number or a boolean."""
+    if is_record(form):
+        record: Record = form
+        return [
+            (f"{record.__name__}.{field}", kind if members(kind) else float)
+            for field, kind in members(record)
+        ]
+    if is_array(form):
+        return [(f"{name}[{k}]", one) for k, one in enumerate(get_args(form))]
+    if isinstance(form, tuple):
+        return [(f"result {k}", one) for k, one in enumerate(form, start=1)]
+    return []
 
 
 def _words(given: Any) -> str:

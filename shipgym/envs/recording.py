@@ -1,6 +1,5 @@
 """Episodes of an environment written to files, for replay and identification."""
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, SupportsFloat, TypeVar
@@ -10,7 +9,8 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.checks import unexpected
-from shipgym.envs.episode import Episode
+from shipgym.envs.episode import Episode, as_json
+from shipgym.envs.ship_env import ShipEnv
 from shipgym.errors import InputError
 from shipgym.files import make_folder
 from shipgym.models import ShipModel
@@ -55,12 +55,16 @@ class RecordEpisode(
             folder=str(folder),
             overwrite=overwrite,
         )
-        _check_environment(env)
+        self._ship: Any = getattr(env, "unwrapped", env)
+        if not isinstance(self._ship, ShipEnv):
+            expected = "a single environment of shipgym"
+            raise unexpected("env", expected, env, "give each its own recorder")
         super().__init__(env)
         self.episode_number = -1
         self._folder = _folder(Path(folder), overwrite)
         self._since_seed = -1
-        self._recorded: _Recorded | None = None
+        self._actions: list[Floats] = []
+        self._rewards: list[float] = []
 
     def reset(
         self,
@@ -72,11 +76,10 @@ class RecordEpisode(
         self._write()
         observation, info = super().reset(seed=seed, options=options)
         self.episode_number += 1
-        if seed is None:
-            self._since_seed += 1
-        else:
-            self._since_seed = 0
-        self._recorded = _Recorded(self.env, self._since_seed, info)
+        self._since_seed = self._since_seed + 1 if seed is None else 0
+        self._ends = (False, False)
+        self._actions, self._rewards = [], []
+        self._states, self._infos = [self._ship.physical_state()], [info]
         return observation, info
 
     def step(
@@ -84,10 +87,13 @@ class RecordEpisode(
     ) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
         """Take one step; the one that ends an episode writes its files."""
         observation, reward, terminated, truncated, info = super().step(action)
-        if self._recorded is not None:
-            self._recorded.add(action, float(reward), terminated, truncated, info)
-            if terminated or truncated:
-                self._write()
+        self._actions.append(np.array(action, dtype=float).reshape(-1))
+        self._rewards.append(float(reward))
+        self._states.append(self._ship.physical_state())
+        self._infos.append(info)
+        self._ends = (bool(terminated), bool(truncated))
+        if terminated or truncated:
+            self._write()
         return observation, reward, terminated, truncated, info
 
     def close(self) -> None:
@@ -96,83 +102,44 @@ class RecordEpisode(
         super().close()
 
     def _write(self) -> None:
-        recorded = self._recorded
-        self._recorded = None
-        if recorded is None or not recorded.rewards:
-            return
-        name = f"episode-{self.episode_number:05d}.json"
-        recorded.episode().save(self._folder / name)
+        """Write what has been recorded, if there is a step of it."""
+        if self._rewards:
+            name = f"episode-{self.episode_number:05d}.json"
+            self._episode().save(self._folder / name)
+        self._rewards = []
 
-
-class _Recorded:
-    """Record of the episode so far.
-
-    Path and ship are taken at its beginning, because the next reset may change them.
-    """
-
-    def __init__(
-        self,
-        env: gymnasium.Env[Any, Any],
-        since_seed: int,
-        info: Mapping[str, Any],
-    ) -> None:
-        ship: Any = env.unwrapped
+    def _episode(self) -> Episode:
+        """Make the episode."""
+        ship, spec = self._ship, self.env.spec
         model: ShipModel = ship.model
         seed = ship.np_random_seed
-        if seed is not None and seed < 0:  # of a generator set by hand
-            seed = None
-        self._ship = ship
-        self._actions: list[Floats] = []
-        self.rewards: list[float] = []
-        self._states: list[dict[str, float]] = [ship.physical_state()]
-        self._infos = [info]
-        self._facts: dict[str, Any] = {
-            "environment": env.spec.id if env.spec else type(ship).__name__,
-            "arguments": plain(env.spec.kwargs) if env.spec else {},
-            "model": model.name,
-            "number": since_seed,
-            "dt": float(ship.dt),
-            "seed": seed,
-            "length": model.particulars["length"],
-            "beam": model.particulars["beam"],
-            "rudder_limit": model.steering.limit,
-            "waypoints": ship.waypoints,
-            "turn_radius": ship.turn_radius,
-            "corridor": ship.corridor,
-        }
-
-    def add(
-        self,
-        action: Any,
-        reward: float,
-        terminated: bool,
-        truncated: bool,
-        info: Mapping[str, Any],
-    ) -> None:
-        """Add one more step and its results."""
-        self._actions.append(np.array(action, dtype=float).reshape(-1))
-        self.rewards.append(reward)
-        self._states.append(self._ship.physical_state())
-        self._infos.append(info)
-        success = info.get("success")
-        self._facts["terminated"] = bool(terminated)
-        self._facts["truncated"] = bool(truncated)
-        self._facts["success"] = None if success is None else bool(success)
-
-    def episode(self) -> Episode:
-        """Make the episode."""
-        states = _columns(self._states)
-        numbers = _columns(self._infos)
+        states, numbers = _columns(self._states), _columns(self._infos)
         parts = [name for name in numbers if name.startswith(REWARD)]
-        commands = self._ship.model.command_names
+        orders = {name: states[f"{name}_command"] for name in model.command_names}
+        success = self._infos[-1].get("success")
         return Episode(
+            environment=spec.id if spec else type(ship).__name__,
+            arguments=as_json(spec.kwargs) if spec else {},
+            model=model.name,
+            number=self._since_seed,
+            dt=float(ship.dt),
+            # below 0 of a generator set by hand
+            seed=None if seed is None or seed < 0 else seed,
+            length=model.particulars["length"],
+            beam=model.particulars["beam"],
+            rudder_limit=model.steering.limit,
+            waypoints=ship.waypoints,
+            turn_radius=ship.turn_radius,
+            corridor=ship.corridor,
             states=states,
             actions=np.array(self._actions),
-            rewards=np.array(self.rewards),
-            commands={name: states[f"{name}_command"][1:] for name in commands},
+            rewards=np.array(self._rewards),
+            commands={name: values[1:] for name, values in orders.items()},
             reward_parts={name: numbers.pop(name)[1:] for name in parts},
             info=numbers,
-            **self._facts,
+            terminated=self._ends[0],
+            truncated=self._ends[1],
+            success=None if success is None else bool(success),
         )
 
 
@@ -190,18 +157,6 @@ def _columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, Floats]:
     return columns
 
 
-def _check_environment(env: Any) -> None:
-    if not isinstance(env, gymnasium.Env):
-        expected = "a single environment"
-        raise unexpected("env", expected, env, "give each its own recorder")
-    for name in ("physical_state", "model", "dt"):
-        if not hasattr(env.unwrapped, name):
-            raise InputError(
-                f"env: expected an environment of shipgym, got {env.unwrapped}, which"
-                f" has no '{name}'"
-            )
-
-
 def _folder(folder: Path, overwrite: bool) -> Path:
     """Make the folder of recordings; InputError where it holds earlier ones."""
     make_folder(folder)
@@ -212,25 +167,3 @@ def _folder(folder: Path, overwrite: bool) -> Path:
             " choose another folder or overwrite=True"
         )
     return folder
-
-
-def plain(value: Any) -> Any:
-    """Argument of an environment, ready for JSON.
-
-    A model is its name, a weather its fields.
-    """
-    if isinstance(value, ShipModel):
-        return value.name
-    if isinstance(value, np.generic | np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, Mapping):
-        return {str(key): plain(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(entry) for entry in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return repr(value)
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
-    if hasattr(value, "to_dict"):
-        return plain(value.to_dict())
-    return str(value)

@@ -22,15 +22,10 @@ USUAL_BEAM = 0.15  # of the length, where the beam is not known
 WAKE_POINTS = 400  # that are kept
 
 WATER = (234, 241, 245)
-INK = (28, 40, 48)
-FAINT = (104, 122, 134)
 PANEL = (250, 252, 253)
 HULL = (42, 62, 80)
 WAKE = (120, 160, 190)
-RUDDER = (200, 60, 40)
-PATH = (60, 110, 70)
 CORRIDOR = (222, 236, 224)
-ORDER = (200, 120, 10)
 
 #: Outline of a ship from above: forward and to starboard, in lengths and beams.
 OUTLINE = np.array([[0.5, 0.0], [0.38, 0.36], [0.2, 0.5], [-0.42, 0.5], [-0.5, 0.36]])
@@ -132,15 +127,15 @@ class _Chart:
 
     def line(self, colour: Any, points: Any, width: int = 2 * FINER) -> None:
         """Draw a line through places."""
-        self._draw.lines(self.surface, colour, False, self.pixels(points), width)
+        self._draw.lines(self.surface, rgb(colour), False, self.pixels(points), width)
 
     def polygon(self, colour: Any, points: Any) -> None:
         """Fill the area between places."""
-        self._draw.polygon(self.surface, colour, self.pixels(points))
+        self._draw.polygon(self.surface, rgb(colour), self.pixels(points))
 
     def circle(self, colour: Any, centre: Any, radius: float, width: int = 0) -> None:
         """Draw a circle of a radius in pixels, or fill it."""
-        self._draw.circle(self.surface, colour, self.pixels(centre), radius, width)
+        self._draw.circle(self.surface, rgb(colour), self.pixels(centre), radius, width)
 
     def write(self, lines: dict[str, str]) -> None:
         """Write labels and values in the upper left corner."""
@@ -150,8 +145,8 @@ class _Chart:
         self.surface.fill(PANEL, (0, 0, right, below))
         for row, (label, text) in enumerate(lines.items()):
             down = 6 * FINER + spacing * row
-            name = self._font.render(label, True, FAINT)
-            value = self._font.render(text, True, INK)
+            name = self._font.render(label, True, rgb("faint"))
+            value = self._font.render(text, True, rgb("ink"))
             self.surface.blit(name, (8 * FINER, down))
             left = right - 8 * FINER - value.get_width()
             self.surface.blit(value, (left, down))
@@ -185,21 +180,21 @@ def _draw_path(chart: _Chart, engine: Engine, lane: int) -> None:
     chart.line(CORRIDOR, points, round(2.0 * half))
     for point in points:
         chart.circle(CORRIDOR, point, half)
-    chart.line(PATH, points)
+    chart.line("safe", points)
     for point in waypoints:
-        chart.circle(PATH, point, 5 * FINER, 2 * FINER)
+        chart.circle("safe", point, 5 * FINER, 2 * FINER)
 
 
 def _draw_shape(chart: _Chart, shape: Shape) -> None:
     if isinstance(shape, Line):
-        chart.line(rgb(shape.colour), shape.points)
+        chart.line(shape.colour, shape.points)
     elif isinstance(shape, Circle):
         width = 0 if shape.filled else 2 * FINER
         radius = shape.radius / chart.metres
-        chart.circle(rgb(shape.colour), (shape.x, shape.y), radius, width)
+        chart.circle(shape.colour, (shape.x, shape.y), radius, width)
     elif isinstance(shape, ShipOutline):
         hull = _hull(shape.x, shape.y, shape.psi, shape.length, shape.beam)
-        chart.polygon(rgb(shape.colour), hull)
+        chart.polygon(shape.colour, hull)
 
 
 def _draw_ship(
@@ -211,14 +206,14 @@ def _draw_ship(
     centre = np.array([state["x"], state["y"]])
     if "set_point" in state:
         order = centre + 1.6 * length * _direction(state["set_point"])
-        chart.line(ORDER, [centre, order])
+        chart.line("warning", [centre, order])
 
     ahead = _direction(state["psi"])
     chart.line(HULL, [centre, centre + 1.1 * length * ahead], FINER)
     # a rudder to starboard puts its trailing edge to starboard of the stern
     stern = centre - 0.5 * length * ahead
     blade = stern - 0.22 * length * _direction(state["psi"] - state["delta"])
-    chart.line(RUDDER, [stern, blade], 3 * FINER)
+    chart.line("danger", [stern, blade], 3 * FINER)
     chart.polygon(HULL, _hull(state["x"], state["y"], state["psi"], length, beam))
 
 

@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 
 import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from shipgym.arrays import Flags
@@ -26,7 +26,6 @@ VecEnv: Any = library(
 
 Observations = NDArray[np.float32]
 Indices = None | int | Sequence[int]
-Vectors = VectorEnv[Any, Any, Any]
 
 
 class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
@@ -40,33 +39,31 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
     Monitor writes it (return `r`, length `l`, time `t`), and its `cost`. Copy the list
     to keep infos beyond the next step.
 
-    Raises InputError for an environment that is not native, an unknown keyword or a
-    value out of its range, or options together with an existing environment.
+    Raises InputError for an unknown keyword or a value out of its range.
 
     Parameters
     ----------
-    env : str or VectorEnv
-        An environment's id, or a native vector environment with the autoreset mode
-        SAME_STEP, also within Gymnasium's wrappers of vector environments.
-    num_envs : int, optional
-        Number of ships; by default 1, or that of the given environment.
+    env_id : str
+    num_envs : int
+        Number of ships.
     seed : int, optional
         Row i has the seed `seed + i`, as if `seed` was called.
     **options
-        Of the environment, `threads` among them.
+        Of the environment.
     """
 
     def __init__(
         self,
-        env: str | Vectors,
-        num_envs: int | None = None,
+        env_id: str,
+        num_envs: int = 1,
         *,
         seed: int | None = None,
         **options: Any,
     ) -> None:
-        self.vector_env: Any = _native(env, num_envs, options)
-        self._ships: ShipVectorEnv = self.vector_env.unwrapped
-        n = self.vector_env.num_envs
+        mode = AutoresetMode.SAME_STEP  # of stable-baselines3
+        made: Any = gymnasium.make_vec(env_id, num_envs, autoreset_mode=mode, **options)
+        self.vector_env: ShipVectorEnv = made
+        n = made.num_envs
         super().__init__(
             n,
             self.vector_env.single_observation_space,
@@ -174,8 +171,9 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
     def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
         """Attribute of the native environment, which all rows share, for some rows."""
         single = f"single_{attr_name}"  # spaces of one ship
-        name = single if hasattr(self._ships, single) else attr_name
-        return [getattr(self._ships, name) for _ in self._get_indices(indices)]
+        ships = self.vector_env
+        name = single if hasattr(ships, single) else attr_name
+        return [getattr(ships, name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> NoReturn:
         """Refuse: what the ships are is fixed when they are made."""
@@ -190,7 +188,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         """Refuse: there is one environment, not one for each row."""
         raise InputError(
             f"env_method: expected a method of all ships together, got {method_name!r};"
-            f" call vector_env.unwrapped.{method_name}()"
+            f" call vector_env.{method_name}()"
         )
 
     def env_is_wrapped(
@@ -216,39 +214,3 @@ def _info_of(infos: Infos, row: int) -> dict[str, Any]:
         else:
             info[name] = values[row].item()
     return info
-
-
-def _native(env: str | Vectors, num_envs: int | None, options: dict[str, Any]) -> Any:
-    """Native vector environment by its id, or as given."""
-    made: Any = env
-    if isinstance(env, str):
-        if "autoreset_mode" in options:
-            raise InputError(
-                "autoreset_mode: expected none, because stable-baselines3 begins"
-                f" episodes in the same step, got {options['autoreset_mode']!r}"
-            )
-        made = gymnasium.make_vec(
-            env,
-            num_envs=1 if num_envs is None else num_envs,
-            autoreset_mode=AutoresetMode.SAME_STEP,
-            **options,
-        )
-    elif num_envs is not None or options:
-        raise InputError(
-            "num_envs, options: expected none with an environment that is made already,"
-            f" got {sorted(options) or num_envs}; give them where it is made, or give"
-            " its id"
-        )
-
-    if not isinstance(getattr(made, "unwrapped", None), ShipVectorEnv):
-        raise InputError(
-            "env: expected the id of an environment of shipgym or what"
-            f" gymnasium.make_vec makes of it, also wrapped, got {made!r}"
-        )
-    mode = made.metadata["autoreset_mode"]
-    if mode is not AutoresetMode.SAME_STEP:
-        raise InputError(
-            f"env: expected autoreset_mode SAME_STEP, got {mode.name}:"
-            " gymnasium.make_vec(..., autoreset_mode='SameStep')"
-        )
-    return made

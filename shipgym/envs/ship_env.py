@@ -131,10 +131,10 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             Fixes this episode and all that follow it.
         options : dict, optional
             Until the next reset: settings of the task by their names, such as
-            `waypoints` of the path, or of several. Observations keep the scales of the
-            environment. `start`, for this episode alone: a dictionary of
-            `heading_error`, rad, `cross_track`, m, `speed`, m/s, `yaw_rate`, rad/s, and
-            `rudder`, rad, of the ship at the start.
+            `waypoints` of the path. Observations keep the scales of the environment.
+            `start`, for this episode alone: a dictionary of `heading_error`, rad,
+            `cross_track`, m, `speed`, m/s, `yaw_rate`, rad/s, and `rudder`, rad, of the
+            ship at the start.
 
         Returns
         -------
@@ -170,7 +170,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         ----------
         action : array of shape (n_commands,), or int
             Commanded rudder, and shaft speed, parts of their limits, clipped to [-1,
-            1]; or the number of a rudder order, or of a rudder and a shaft order.
+            1]; or the number of a rudder order.
 
         Returns
         -------
@@ -233,7 +233,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
 
     def _order(self, action: Any) -> None:
         """Set the command; InputError for an invalid action."""
-        if self._orders:
+        if len(self._orders):
             action = given_orders(self._orders, action, self.action_space, "action")[0]
         # as in the action space: its numbers need no check
         elif not (isinstance(action, np.ndarray) and action.dtype is FLOAT32):

@@ -49,8 +49,6 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         Whether a model that was found unstable when it was identified may be used.
     autoreset_mode : AutoresetMode or str
         When the next episode of a row begins.
-    threads : int
-        Number of threads that share the rows; the results do not depend on it.
     max_episode_steps : int, optional
         Steps after which an episode is cut off, as by `gymnasium.make`.
     action_repeat, rate_limit, frame_stack, constraint_cost, **options
@@ -65,7 +63,6 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         render_mode: str | None = None,
         allow_unstable: bool = False,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        threads: int = 1,
         max_episode_steps: int | None = None,
         action_repeat: int = 1,
         rate_limit: float | None = None,
@@ -78,8 +75,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         observation_space, action_space = self._make(
             arguments, VECTOR_OPTIONS, ["rgb_array"]
         )
-        if self._engine.program.users_code:
-            check_once(self.model, self.task, self.randomisation)
+        check_once(self._engine.program, self.model, self.task, self.randomisation)
         self.num_envs = int(num_envs)
         self.metadata = {
             "render_modes": ["rgb_array"],
@@ -233,7 +229,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         ----------
         actions : array of shape (num_envs, n_commands)
             See the single environment; rudder orders are an int array of shape
-            (num_envs,), those of rudder and shaft one of shape (num_envs, 2).
+            (num_envs,).
 
         Returns
         -------
@@ -249,7 +245,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             self._refuse_step()
         if self._keeps_ends and self._over.any():
             self._refuse_over()
-        if self._orders:
+        if len(self._orders):
             actions = given_orders(self._orders, actions, self.action_space, "actions")
         engine = self._engine
         engine.order(actions)

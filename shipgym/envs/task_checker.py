@@ -1,6 +1,7 @@
 """Battery of checks for a task, reward or sensor set of a user's own."""
 
 from collections.abc import Iterator
+from functools import partial
 from time import monotonic
 from typing import Any, NamedTuple
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from shipgym.arrays import Floats
 from shipgym.engine import episodes
 from shipgym.engine.cache import cached_path
+from shipgym.engine.episode_program import EpisodeProgram
 from shipgym.engine.fingerprint import fingerprint
 from shipgym.engine.specialise import loaded_names
 from shipgym.envs.engine import Engine
@@ -22,8 +24,8 @@ from shipgym.models import ShipModel
 from shipgym.python_files import asked, place_of
 from shipgym.tasks.task import Task
 
-STEPS = 400
-PLAIN_STEPS = 40  # in plain Python, at least
+STEPS = 400  # in plain Python, at most
+PLAIN_STEPS = 40  # of them that are compared, at least
 PLAIN_SECONDS = 3.0  # more of them for so long
 PLAIN_LANES = 3
 MANY = 70  # ships, more than a tile
@@ -42,10 +44,9 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
     """Check a task for errors.
 
     Its records and functions; compilation; some steps in plain Python, whose errors
-    name the line; some hundred steps of many ships under crude orders: rewards, state
-    and observations finite; the same results compiled and in plain Python, for one ship
-    and for many. It remarks on positive rewards, and on rewards, under random orders,
-    of which most lies in rare events.
+    name the line; the same results compiled; episodes of many ships under random
+    orders: rewards, state and observations finite. It remarks on positive rewards, and
+    on rewards of which most lies in rare events.
 
     The task is a file or module (`shipgym.tasks.contract`), or the name of one of the
     package's; options are keywords of the environment, `model`, `reward` and `sensors`
@@ -59,21 +60,19 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
         return TaskCheck(str(task), (str(error),))
 
 
-def check_once(model: ShipModel, task: Task, randomisation: Randomisation) -> None:
+def check_once(
+    program: EpisodeProgram, model: ShipModel, task: Task, randomisation: Randomisation
+) -> None:
     """Check a task of a user's own if it is new; InputError tells its problems.
 
     A file in the cache folder stands for one that was sound.
     """
-    program = Engine(model, 1, task, randomisation, allow_unstable=True).program
     if not (program.users_code and task.checked):
         return
     content = fingerprint(episodes.run, program.hooks)
-    asked_for = (model.name, task.settings, task.options)
-    signature = repr(asked_for)
+    signature = repr((model.name, task.settings, task.options))
     known = cached_path(content, signature)
-    mark = None
-    if known:
-        mark = known.with_suffix(".sound")
+    mark = known and known.with_suffix(".sound")
     if mark and mark.exists():
         return
     found = _checked(model, task, randomisation)
@@ -85,69 +84,66 @@ def check_once(model: ShipModel, task: Task, randomisation: Randomisation) -> No
 
 def _checked(model: ShipModel, given: Task, randomisation: Randomisation) -> TaskCheck:
     """Check a task with a ship; InputError where it fails."""
-
-    def engine(lanes: int, loop: Any = None) -> Engine:
-        return Engine(
-            model, lanes, given, randomisation, allow_unstable=True, loop=loop
-        )
-
-    plain = engine(PLAIN_LANES, plain_loop)
-    _sail_in_python(plain)
+    made = partial(Engine, model, task=given, randomisation=randomisation)
+    plain = made(PLAIN_LANES, allow_unstable=True, loop=plain_loop)
     plain.shapes(0)
-    few, many, one = engine(PLAIN_LANES), engine(MANY), engine(1)
-    problems = [
-        *_not_finite(many),
-        *_differ(few, plain, PLAIN_STEPS, 1e-5, "in plain Python"),
-        *_differ(many, one, STEPS // 4, 0.0, "alone"),
-    ]
-    sailed = _sailed_at_random(many)
-    remarks = list(_printed(many))
-    positive = list(_positive(many, sailed))
+    few = made(PLAIN_LANES, allow_unstable=True)
+    problems = list(_differ(few, plain))
+    sailed = _sailed(made(MANY, allow_unstable=True))
+    remarks = list(_printed(few))
+    positive = list(_positive(few, sailed))
     remarks += positive or _rare(sailed)
-    return TaskCheck(given.name, tuple(problems), tuple(remarks))
+    return TaskCheck(given.name, (*problems, *sailed.faults.values()), tuple(remarks))
 
 
-def _orders(engine: Engine, step: int) -> Floats:
-    """Crude orders: to and fro, hard over, none; the same for a lane."""
-    lanes = np.arange(engine.num_envs)
-    # each lane swings differently
-    frequency = 0.11 * (1.0 + 0.3 * (lanes % 7))
-    swing = np.sin(frequency * step + lanes)
-    rudder = np.choose(lanes % 4, [swing, np.sign(swing), 0.0, 1.0])
-    return np.repeat(rudder[:, None], engine.task.n_commands, axis=1)
+def _differ(engine: Engine, plain: Engine) -> Iterator[str]:
+    """First difference of compiled results from those of plain Python.
 
-
-def _sail_in_python(plain: Engine) -> None:
-    """Take some steps in plain Python; InputError names line and step of an error."""
+    InputError names line and step of an error there.
+    """
+    lanes = plain.num_envs
+    names = ["reward", *_seen_names(engine)]
+    rewards = right_rewards = np.zeros(lanes)
+    observations, right_observations = engine.observations, plain.observations
+    frequency = 0.11 * (1.0 + 0.3 * np.arange(lanes))
     end = monotonic() + PLAIN_SECONDS
     for step in range(min(STEPS, plain.task.episode_steps)):
-        if step >= PLAIN_STEPS and monotonic() > end:
+        found = np.column_stack([rewards, observations])
+        right = np.column_stack([right_rewards, right_observations])
+        close = np.isclose(found, right, 1e-5, 1e-5, equal_nan=True)
+        for lane, column in np.argwhere(~close & (step <= PLAIN_STEPS))[:1]:
+            yield (
+                f"{names[column]} is {found[lane, column]} compiled and"
+                f" {right[lane, column]} in plain Python in lane {lane} at step {step};"
+                " look for what differs, such as a global that changes"
+            )
             return
+        if step > PLAIN_STEPS and monotonic() > end:
+            return
+        # to and fro, hard over, and none
+        swing = np.sin(frequency * step + np.arange(lanes))
+        rudder = np.array([swing[0], np.sign(swing[1]), 0.0])
+        orders = np.repeat(rudder[:, None], plain.task.n_commands, axis=1)
         try:
-            asked(plain.step, _orders(plain, step))
+            right_observations, right_rewards, *_ = asked(plain.step, orders)
         except InputError as error:
             # the step distinguishes an error of the beginning from one of a rare event
             where = f"at step {step + 1} in plain Python"
             raise InputError(f"{error}, {where}") from error
+        observations, rewards, *_ = engine.step(orders)
 
 
-def _not_finite(engine: Engine) -> Iterator[str]:
-    """Numbers of reward, state and observations that are not finite, each once."""
-    observations = engine.reset(np.arange(engine.num_envs))
-    found: set[str] = set()
-    for step in range(min(STEPS, engine.task.episode_steps) + 1):
-        if step > 0:
-            observations, *_ = engine.step(_orders(engine, step - 1))
-        for name, values in _numbers(engine, observations).items():
-            wrong = ~np.isfinite(values)
-            if name in found or not wrong.any():
-                continue
-            found.add(name)
-            lane = int(np.argmax(wrong))
-            yield (
-                f"{_source_of(name, engine.task)}: {name}: expected a finite number,"
-                f" got {values[lane]} in lane {lane} at step {step}"
-            )
+def _note_faults(faults: dict[str, str], engine: Engine, step: int) -> None:
+    """Note numbers of reward, state and observations that are not finite, each once."""
+    for name, values in _numbers(engine, engine.observations).items():
+        wrong = ~np.isfinite(values)
+        if name in faults or not wrong.any():
+            continue
+        lane = int(np.argmax(wrong))
+        faults[name] = (
+            f"{_source_of(name, engine.task)}: {name}: expected a finite number,"
+            f" got {values[lane]} in lane {lane} at step {step}"
+        )
 
 
 def _numbers(
@@ -179,31 +175,6 @@ def _source_of(name: str, task: Task) -> str:
     return f"{definition.source}, or the sensors of {task.sensors.source}"
 
 
-def _differ(
-    one: Engine, other: Engine, steps: int, agreement: float, other_way: str
-) -> Iterator[str]:
-    """First difference of an engine's last lanes from those of another."""
-    lanes = slice(-other.num_envs, None)
-    names = ["reward", *_seen_names(one)]
-    seeds = np.arange(one.num_envs)
-    rewards, other_rewards = np.zeros(one.num_envs), np.zeros(other.num_envs)
-    observations, others = one.reset(seeds), other.reset(seeds[lanes])
-    for step in range(min(steps, one.task.episode_steps) + 1):
-        results = np.column_stack([rewards, observations])[lanes]
-        expected = np.column_stack([other_rewards, others])
-        close = np.isclose(results, expected, agreement, agreement, equal_nan=True)
-        for lane, column in np.argwhere(~close)[:1]:
-            yield (
-                f"{names[column]} is {results[lane, column]} compiled and"
-                f" {expected[lane, column]} {other_way} in lane {seeds[lanes][lane]} at"
-                f" step {step}; look for what differs, such as a global that changes"
-            )
-            return
-        orders = _orders(one, step)
-        observations, rewards, *_ = one.step(orders)
-        others, other_rewards, *_ = other.step(orders[lanes])
-
-
 def _printed(engine: Engine) -> Iterator[str]:
     """Remark on users' functions that print."""
     for function in engine.program.users_code:
@@ -220,24 +191,27 @@ class _Sailed(NamedTuple):
 
     rewards: Floats  # shape (n_steps,)
     parts: Floats  # before they are bounded, shape (n_steps, n_parts)
+    faults: dict[str, str]  # of numbers that are not finite
 
 
-def _sailed_at_random(engine: Engine) -> _Sailed:
+def _sailed(engine: Engine) -> _Sailed:
     """Sail ships up to their ends under random orders, each held for a while."""
     random = np.random.default_rng(0)
-    engine.reset(np.arange(MANY))
     sailing = np.ones(MANY, dtype=np.bool_)
     earned, parts = [], []
+    faults: dict[str, str] = {}
+    _note_faults(faults, engine, 0)
     for step in range(engine.task.episode_steps):
         if step % HELD == 0:
             orders = random.uniform(-1.0, 1.0, (MANY, engine.task.n_commands))
         _, rewards, terminated, truncated = engine.step(orders)
+        _note_faults(faults, engine, step + 1)
         earned.append(rewards[sailing])
         parts.append(engine.reward_parts[sailing])
         sailing &= ~(terminated | truncated)
         if not sailing.any():
             break
-    return _Sailed(np.concatenate(earned), np.concatenate(parts))
+    return _Sailed(np.concatenate(earned), np.concatenate(parts), faults)
 
 
 def _positive(engine: Engine, sailed: _Sailed) -> Iterator[str]:

@@ -4,7 +4,7 @@ from math import sqrt
 from typing import Annotated, NamedTuple
 
 from shipgym.engine.mathematics import clip, sin_cos
-from shipgym.tasks.contract import ObservationSpec, Setting, drawn, under_way
+from shipgym.tasks.contract import ObservationSpec, Setting, Unit, drawn, under_way
 from shipgym.tasks.shapes import ChartWidth, Line, ShipOutline
 
 EPISODE_STEPS = 300
@@ -33,8 +33,8 @@ class Reward(NamedTuple):
 
 
 class Observation(NamedTuple):
-    heading_sin: Annotated[float, ObservationSpec(-1.0, 1.0)]
-    heading_cos: Annotated[float, ObservationSpec(-1.0, 1.0)]
+    heading_sin: Unit
+    heading_cos: Unit
     yaw_rate: Annotated[
         float, ObservationSpec(-5, 5, "rad/s", lambda ship, _: ship.speed / ship.length)
     ]

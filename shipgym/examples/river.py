@@ -5,7 +5,13 @@ from math import cos, fabs, pi, sin
 from typing import Annotated, NamedTuple
 
 from shipgym.engine.mathematics import arctan2, clip, pick, sin_cos, wrap
-from shipgym.tasks.contract import ObservationSpec, Setting, at_service_speed, drawn
+from shipgym.tasks.contract import (
+    ObservationSpec,
+    Setting,
+    Unit,
+    at_service_speed,
+    drawn,
+)
 from shipgym.tasks.shapes import ChartWidth, Line
 
 EPISODE_STEPS = 600
@@ -33,8 +39,8 @@ class Reward(NamedTuple):
 
 
 class Observation(NamedTuple):
-    course_sin: Annotated[float, ObservationSpec(-1.0, 1.0)]  # along the river
-    course_cos: Annotated[float, ObservationSpec(-1.0, 1.0)]
+    course_sin: Unit  # along the river
+    course_cos: Unit
     bend: Annotated[float, ObservationSpec(-3.0, 3.0, "rad", 0.5)]  # a length ahead
     yaw_rate: Annotated[float, ObservationSpec(-5.0, 5.0, "rad/s", 0.025)]
     sway: Annotated[float, ObservationSpec(-2.0, 2.0, "m/s", 8.0)]

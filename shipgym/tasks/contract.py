@@ -72,6 +72,8 @@ those of `shipgym.engine.mathematics`, and choose by `pick` or a conditional exp
 The other functions are called ship by ship and may do what Numba can.
 """
 
+from typing import Annotated
+
 import numpy as np
 
 from shipgym.engine.annotations import (
@@ -87,6 +89,9 @@ from shipgym.engine.mathematics import arctan2, clip, pick, sin_cos, wrap
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.random import GOLDEN, NORMAL, episode_word, normal, uniform
 from shipgym.engine.records import Size
+
+#: Observation between -1 and 1, of the same physical value.
+Unit = Annotated[float, ObservationSpec(-1.0, 1.0)]
 
 
 def drawn(random: Random, number: int, low: float, high: float) -> float:
@@ -126,6 +131,7 @@ __all__ = [
     "Setting",
     "Ship",
     "Size",
+    "Unit",
     "arctan2",
     "at_service_speed",
     "clip",

@@ -386,19 +386,16 @@ _FILLED: dict[Any, FunctionType] = {}
 
 
 def _with_reward(definition: TaskDefinition, source: Any) -> TaskDefinition:
-    """Replace the reward of a task by that of a file: `reward`, or a whole `step`."""
+    """Replace the reward of a task by that of a file."""
     namespace, where = read_source(source)
-    has_step = hasattr(namespace, "step") and not hasattr(namespace, "reward")
-    name = "step" if has_step else "reward"
     found = check_namespace(
         namespace,
         where,
         records=("Reward",),
-        functions={name: MOMENT, "worst_cost": ("settings",)},
+        functions={"reward": MOMENT, "worst_cost": ("settings",)},
         optional=("worst_cost",),
     )
-    if not has_step:
-        found["step"] = _filled(definition.step, found.pop("reward"))
+    found["step"] = _filled(definition.step, found.pop("reward"))
     rewarded = replace(definition, **found)
     _check_names(rewarded)
     return rewarded

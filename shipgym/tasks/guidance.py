@@ -130,7 +130,6 @@ def _arc(course: float, turn: float) -> Floats:
 
 def _checked_waypoints(given: Any) -> Floats:
     """Waypoints as an array, shape (n, 2); InputError for an invalid path."""
-    furthest = 1e8  # m from the origin: more than the way round the earth
     try:
         points = np.array(given, dtype=float)
     except (TypeError, ValueError):
@@ -141,15 +140,12 @@ def _checked_waypoints(given: Any) -> Floats:
             f" got shape {points.shape}"
         )
 
-    for row, point in enumerate(points):
-        found = point.tolist()
-        if not np.isfinite(point).all():
-            expected = "finite numbers in m"
-        elif np.abs(point).max() > furthest:
-            expected = f"m within {furthest:g} of the origin"
-        elif row > 0 and np.array_equal(point, points[row - 1]):
-            expected = "another point than in the row before"
-        else:
-            continue
-        raise InputError(f"waypoints: row {row}: expected {expected}, got {found}")
+    # no further than more than the way round the earth
+    wrong = ~(np.abs(points) <= 1e8).all(axis=1)
+    wrong[1:] |= (points[1:] == points[:-1]).all(axis=1)
+    for row in np.flatnonzero(wrong)[:1]:
+        raise InputError(
+            f"waypoints: row {row}: expected finite numbers in m, and another point"
+            f" than in the row before, got {points[row].tolist()}"
+        )
     return points

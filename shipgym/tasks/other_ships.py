@@ -11,7 +11,7 @@ import numpy as np
 
 from shipgym.engine.mathematics import clip, pick, sin_cos, wrap
 from shipgym.engine.motion import Motion, Ship
-from shipgym.tasks.contract import ObservationSpec, Random, drawn
+from shipgym.tasks.contract import ObservationSpec, Random, Unit, drawn
 from shipgym.tasks.traffic import (
     GIVE_WAY,
     HEAD_ON,
@@ -282,7 +282,6 @@ def decided(other: Other, near: Approach, ship: Ship) -> Other:
 
 FURTHEST = 60.0  # lengths of own ship, to which others are seen
 
-Unit = Annotated[float, ObservationSpec(-1.0, 1.0)]
 Far = Annotated[
     float,
     ObservationSpec(0.0, 6.0, "m", lambda ship, _: 10.0 * ship.length),

@@ -28,6 +28,7 @@ from shipgym.tasks.contract import (
     Random,
     Readings,
     Setting,
+    Unit,
     at_service_speed,
     drawn,
 )
@@ -136,10 +137,7 @@ class Settings(NamedTuple):
     weights: Weights = Weights()
     waypoints: Annotated[
         Numbers,
-        Setting(
-            "North and east, m, of a path, shape (n, 2), or a list of paths, one of"
-            " which each episode follows; by default a path is drawn."
-        ),
+        Setting("North and east, m, of a path, shape (n, 2); by default one is drawn."),
     ] = NO_NUMBERS
 
 
@@ -198,8 +196,8 @@ class Observation(NamedTuple):
 
     helm: SteeringSignals
     cross_track: Annotated[float, ObservationSpec(-5.0, 5.0, "m", half_corridor)]
-    course_error_sin: Annotated[float, ObservationSpec(-1.0, 1.0)]  # over ground
-    course_error_cos: Annotated[float, ObservationSpec(-1.0, 1.0)]
+    course_error_sin: Unit  # over ground
+    course_error_cos: Unit
     next_turn_distance: Annotated[float, ObservationSpec(0.0, 1.0, "m", preview)]
     next_turn_angle: Annotated[float, ObservationSpec(-1.0, 1.0, "rad", pi)]
     second_turn_distance: Annotated[float, ObservationSpec(0.0, 1.0, "m", preview)]
@@ -226,9 +224,7 @@ def check(settings: Settings, model: Any) -> None:
         check_room_for_turns(settings)
     elif model is not None:
         radius = settings.turn_radius * model.particulars["length"]
-        n_waypoints = int(settings.waypoints[0])
-        for waypoints in np.reshape(settings.waypoints[1:], (-1, n_waypoints, 2)):
-            Path(waypoints).check_turns(radius)
+        Path(np.reshape(settings.waypoints, (-1, 2))).check_turns(radius)
 
 
 def check_corridor(corridor: float, model: Any) -> None:
@@ -256,49 +252,24 @@ def check_room_for_turns(settings: Settings) -> None:
 
 
 def listed(waypoints: Any) -> Numbers:
-    """Numbers of one path or several: waypoints in a path, then north and east of each.
-
-    A path with fewer than the others has its last leg divided, which changes nothing.
-    """
-    paths = [waypoints]
-    is_list = isinstance(waypoints, list | tuple) and len(waypoints) > 0
-    if is_list and np.ndim(waypoints[0]) == 2:
-        paths = list(waypoints)
-
-    points = [Path(path).waypoints for path in paths]
-    most = max(len(path) for path in points)
-    numbers = [np.array([most])]
-    for path in points:
-        *before, start, end = path
-        missing = most - len(path)
-        last_leg = np.linspace(start, end, 2 + missing)
-        numbers += before
-        numbers.append(last_leg.ravel())
-    return np.concatenate(numbers, dtype=np.float64)
+    """North and east of each waypoint of a path."""
+    return Path(waypoints).waypoints.ravel()
 
 
 def plan_length(settings: Settings) -> int:
     """Length of a plan, which holds north and east of each waypoint."""
     if len(settings.waypoints) == 0:
-        n_waypoints = int(settings.n_legs) + 1
-    else:
-        n_waypoints = int(settings.waypoints[0])
-    return 2 * n_waypoints
+        return 2 * int(settings.n_legs) + 2
+    return len(settings.waypoints)
 
 
 def lay_path(ship: Ship, settings: Settings, random: Random, plan: Numbers) -> None:
-    """Write the waypoints of an episode into its plan: of a listed path, or drawn."""
+    """Write the waypoints of an episode into its plan: as listed, or drawn."""
     waypoints = settings.waypoints
     if len(waypoints) == 0:
         draw_path(ship, settings, random, plan)
-        return
-    size = len(plan)
-    n_paths = (len(waypoints) - 1) // size
-    path_draw = 1 << 21
-    chosen = int(drawn(random, path_draw, 0.0, float(n_paths)))
-    first = 1 + size * chosen
-    for k in range(size):
-        plan[k] = waypoints[first + k]
+    for k in range(len(waypoints)):
+        plan[k] = waypoints[k]
 
 
 def draw_path(ship: Ship, settings: Settings, random: Random, plan: Numbers) -> None:

@@ -10,7 +10,13 @@ from typing import Annotated, Any, NamedTuple
 
 from shipgym.engine.mathematics import clip, pick, sin_cos
 from shipgym.engine.motion import Motion, Ship
-from shipgym.tasks.contract import Interval, ObservationSpec, Readings, Setting
+from shipgym.tasks.contract import (
+    Interval,
+    ObservationSpec,
+    Readings,
+    Setting,
+    Unit,
+)
 from shipgym.tasks.scales import (
     INTEGRAL_LENGTHS,
     INTEGRAL_ZONE_DEG,
@@ -68,7 +74,6 @@ class Weights(NamedTuple):
 
 DEFAULTS = Weights()
 HEADING_SCALE = radians(DEFAULTS.heading_scale_deg)
-ROLL_SCALE = radians(DEFAULTS.roll_scale_deg)
 
 
 def heel_excess(motion: Motion, weights: Weights) -> float:
@@ -131,8 +136,8 @@ def largest_integral(ship: Ship, settings: Any) -> float:
 class SteeringSignals(NamedTuple):
     """Observations of every autopilot."""
 
-    heading_error_sin: Annotated[float, ObservationSpec(-1.0, 1.0)]
-    heading_error_cos: Annotated[float, ObservationSpec(-1.0, 1.0)]
+    heading_error_sin: Unit
+    heading_error_cos: Unit
     yaw_rate: Annotated[float, ObservationSpec(-5.0, 5.0, "rad/s", length_rate)]
     sway: Annotated[float, ObservationSpec(-2.0, 2.0, "m/s", service_speed)]
     surge: Annotated[float, ObservationSpec(-2.0, 3.0, "m/s", service_speed)]

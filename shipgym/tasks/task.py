@@ -39,16 +39,12 @@ VECTOR_OPTIONS = (
     "num_envs",
     *ENV_OPTIONS,
     "autoreset_mode",
-    "threads",
     "max_episode_steps",
 )
 
-ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft", "rudder-shaft-discrete")
+ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft")
 #: Rudder orders of a discrete action, parts of the rudder limit.
 RUDDER_ORDERS = (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 1.0)
-#: Shaft orders of a discrete action, parts of the speed at service speed, as of an
-#: engine telegraph; those astern only where the propeller is known astern.
-_SHAFT_ORDERS = (-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
 _RESET_OPTIONS = ("reset_mask", "start")  # that are no settings of the task
 
 
@@ -83,10 +79,10 @@ class Task:
     max_envelope_distance : float
         Distance from the training data at which an episode ends, in multiples of their
         extent (see `Envelope.distance`).
-    action : {"rudder", "rudder-discrete", "rudder-shaft", "rudder-shaft-discrete"}
-        Commands: the rudder, one of the orders in `RUDDER_ORDERS`, rudder and shaft
-        speed, or an order of each (`orders`). A shaft whose propeller is known ahead
-        only is stopped by an order astern.
+    action : {"rudder", "rudder-discrete", "rudder-shaft"}
+        Commands: the rudder, one of the orders in `RUDDER_ORDERS`, or rudder and shaft
+        speed. A shaft whose propeller is known ahead only is stopped by an order
+        astern.
     roll : bool
         Whether roll angle and rate are observed.
     noise : float
@@ -339,15 +335,10 @@ class Task:
         """Number of commands: rudder, and shaft."""
         return 2 if "shaft" in self.action else 1
 
-    def orders(self, model: ShipModel) -> tuple[tuple[float, ...], ...]:
-        """Orders of each command of a discrete action; empty if it is continuous."""
-        if not self.action.endswith("discrete"):
-            return ()
-        if self.n_commands == 1:
-            return (RUDDER_ORDERS,)
-        least = self.least_shaft(model)
-        shaft_orders = tuple(order for order in _SHAFT_ORDERS if order >= least)
-        return RUDDER_ORDERS, shaft_orders
+    @property
+    def orders(self) -> tuple[float, ...]:
+        """Rudder orders of a discrete action; empty if it is continuous."""
+        return RUDDER_ORDERS if self.action == "rudder-discrete" else ()
 
     @property
     def half_reward_cost(self) -> float:

@@ -68,10 +68,9 @@ LINES = (
     ("export report/lq.json --c c --fmu lq.fmu --name lq", 0),
     ("export path-following-ppo --onnx policy.onnx", 0),
     ("export tanker --c tanker --depth 25", 0),
-    (f"train ppo {TASK_OF_OWN} {LEARNING} {SMALL} --seed 1 --threads 1 --out run", 0),
+    (f"train ppo {TASK_OF_OWN} {LEARNING} {SMALL} --seed 1 --out run", 0),
     (
-        f"train ppo {TASK_OF_OWN} {LEARNING} {SMALL} --seed 1 --threads 1 --resume"
-        " --out run",
+        f"train ppo {TASK_OF_OWN} {LEARNING} {SMALL} --seed 1 --resume --out run",
         0,
     ),
     (f"train ppo {TASK} --model mariner --out run2", 2),

@@ -99,9 +99,7 @@ def test_discrete_orders_are_those_of_torch(algorithm, settings):
 
 
 def test_what_it_learned_in_is_recorded():
-    env = ships(
-        "shipgym/PathFollowing-v0", sea="moderate", leg_lengths=(5.0, 9.0), threads=1
-    )
+    env = ships("shipgym/PathFollowing-v0", sea="moderate", leg_lengths=(5.0, 9.0))
     policy = LearnedPolicy.from_sb3(
         PPO("MlpPolicy", VecNormalize(env, norm_obs=False), n_steps=8, batch_size=32)
     )

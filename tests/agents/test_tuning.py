@@ -87,7 +87,7 @@ def test_folder_of_something_else_is_refused(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="trials: expected an integer of at least 1"):
         tune(plan(), tmp_path / "none", 0)
     monkeypatch.setattr(tuning, "lowest_cost", diverges)
-    with pytest.raises(InputError, match=r"every trial diverged, the last: .* gamma"):
+    with pytest.raises(InputError, match="a trial that does not diverge, got none"):
         tune(plan(), tmp_path / "other", 2)
 
 

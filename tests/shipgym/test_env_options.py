@@ -17,7 +17,6 @@ from shipgym.envs.randomisation import N_SPEEDS, POOL_SIZE
 from shipgym.sea import Waves, Weather
 from shipgym.ships import Envelope
 from shipgym.tasks import course_keeping_task, read_definition
-from shipgym.tasks.steering import ROLL_SCALE
 from shipgym.trials.sensors import SEA_TRIAL
 
 pytestmark = pytest.mark.interpreted
@@ -128,7 +127,7 @@ def test_roll_is_observed_and_priced_where_it_is_asked_for():
         assert shown["roll"] == pytest.approx(state["phi"], abs=1e-6)
         assert shown["roll_rate"] == pytest.approx(state["p"], abs=1e-6)
         assert info["reward_roll"] == pytest.approx(
-            -2.0 * (state["phi"] / ROLL_SCALE) ** 2, abs=1e-12
+            -2.0 * (state["phi"] / np.radians(30.0)) ** 2, abs=1e-12
         )
         heels.append(state["phi"])
         assert not terminated

@@ -8,12 +8,14 @@ import cloudpickle
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.wrappers import RecordEpisodeStatistics, TimeAwareObservation
 from gymnasium.wrappers.vector import RecordEpisodeStatistics as VectorStatistics
 from stable_baselines3.common.monitor import Monitor
 
-from shipgym import InputError, ShipVecEnv, load_model
+from shipgym import InputError, ShipVecEnv, Weather, Wind, load_model
 from shipgym.envs.engine import Engine
+from shipgym.models.model_file import numbers_hash
 from shipgym.tasks import course_keeping_task
 
 PATH, COURSE = "shipgym/PathFollowing-v0", "shipgym/CourseKeeping-v0"
@@ -115,12 +117,6 @@ def test_libraries_read_the_steps_of_an_episode():
     assert TimeAwareObservation(one(COURSE)).reset(seed=0)[0][-1] == 0.0
 
 
-def test_an_unknown_keyword_is_a_type_error_too():
-    for make in (one, many):
-        with pytest.raises(TypeError, match="unexpected keyword argument 'frameskip'"):
-            make(frameskip=1)
-
-
 @pytest.mark.parametrize("record", [lambda env: env, RecordEpisodeStatistics, Monitor])
 def test_the_end_of_an_episode_tells_its_cost_and_success(record):
     env = record(one(episode_steps=20))
@@ -219,10 +215,13 @@ def test_the_largest_number_of_steps_means_the_same_for_one_and_many():
     assert gymnasium.make_vec(rows.spec).num_envs == 3
 
 
-def test_a_spec_with_a_model_at_hand_says_that_it_has_no_file():
-    env = one(COURSE, model=load_model("mariner"))
-    with pytest.raises(InputError, match="spec: model: expected a name or the path"):
-        env.spec.to_json()
+def test_a_spec_with_a_model_and_weather_at_hand_travels_as_json():
+    wind = Weather(wind=Wind(12.0, from_deg=20.0))
+    env = one(COURSE, model=load_model("mariner"), sea=[wind], noise=np.float64(1.0))
+    again = gymnasium.make(EnvSpec.from_json(env.spec.to_json())).unwrapped
+    assert numbers_hash(again.model) == numbers_hash(env.unwrapped.model)
+    assert again.task.seas == env.unwrapped.task.seas
+    np.testing.assert_array_equal(again.reset(seed=3)[0], env.reset(seed=3)[0])
 
 
 @pytest.mark.parametrize(

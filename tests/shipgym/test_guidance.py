@@ -24,10 +24,10 @@ def test_legs_and_turns():
         ({"a": 1}, r"at least 2 rows .*got shape \(0,\)"),
         ([[0, 0, 0], [1, 1, 1]], r"at least 2 rows .*got shape \(2, 3\)"),
         ([[[0, 0], [1, 1]]], r"at least 2 rows .*got shape \(1, 2, 2\)"),
-        ([[0, 0], [0, 0]], "row 1: expected another point"),
+        ([[0, 0], [0, 0]], "row 1: expected finite numbers in m, and another point"),
         ([[0, 0], [1, 0], [1, 0], [2, 0]], r"row 2: .*got \[1.0, 0.0\]"),
-        ([[1e8, -1e8], [0, np.inf]], r"row 1: .*finite numbers in m, got \[0.0, inf\]"),
-        ([[0, 0], [1, 0], [1, -1.01e8]], r"row 2: .*within 1e\+08 of the origin, got"),
+        ([[1e8, -1e8], [0, np.inf]], r"row 1: .*finite numbers.* got \[0.0, inf\]"),
+        ([[0, 0], [1, 0], [1, -1.01e8]], "row 2: expected finite numbers in m, .* got"),
     ],
 )
 def test_a_path_that_is_none_is_refused(waypoints, message):

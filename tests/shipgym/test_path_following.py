@@ -241,20 +241,6 @@ def test_a_current_sets_the_ship_off_and_course_error_shows_it():
 angles, speeds = st.floats(-3.1, 3.1), st.floats(-3.0, 3.0)
 
 
-def test_each_episode_has_one_of_a_list_of_paths():
-    engine = Engine(
-        shipgym.load_model("mariner"),
-        40,
-        Task.of("PathFollowing", waypoints=[LINE, HOOK]),
-    )
-    engine.reset(np.arange(40))
-    ends = [engine.waypoints(lane)[-1].tolist() for lane in range(40)]
-    assert [ends.count(path[-1].tolist()) for path in (LINE, HOOK)] == pytest.approx(
-        [20, 20], abs=8
-    )
-    assert sum(ends.count(path[-1].tolist()) for path in (LINE, HOOK)) == 40
-
-
 def cutter(seen, step, env):
     """Steer straight for the waypoint behind the next, across the inside of
     the turn."""
@@ -348,7 +334,7 @@ def test_stopping_does_not_pay(policy):
         ),
         (
             {"waypoints": [[0, 0], [900, 0], [900, 0]]},
-            "waypoints: row 2: expected another",
+            "waypoints: row 2: expected finite",
         ),
         (
             {"max_turn_deg": 120.0},

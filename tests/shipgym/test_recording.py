@@ -169,7 +169,7 @@ def test_recordings_are_not_mixed_with_earlier_ones(tmp_path):
 def test_what_cannot_be_recorded_is_refused_at_once(tmp_path):
     with pytest.raises(
         InputError,
-        match=r"expected an environment of shipgym, .* has no 'physical_state'",
+        match="expected a single environment of shipgym",
     ):
         RecordEpisode(gymnasium.make("CartPole-v1"), tmp_path)
     several = gymnasium.make_vec(COURSE_KEEPING, num_envs=2, vectorization_mode="sync")

@@ -70,19 +70,6 @@ def test_rows_are_single_environments_with_every_option(name, options):
     )
 
 
-@pytest.mark.parametrize("threads", [2, 5])
-def test_threads_change_nothing(threads):
-    runs = []
-    for count in (1, threads):
-        env = vector(PATH, 200, threads=count, sea="moderate", **SHORT)
-        env.reset(seed=3)
-        env.action_space.seed(1)
-        runs.append([env.step(env.action_space.sample())[:4] for _ in range(50)])
-    for one, other in zip(*runs, strict=True):
-        for a, b in zip(one, other, strict=True):
-            np.testing.assert_array_equal(a, b)
-
-
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
 def test_infos_are_those_of_gymnasiums_own_vector_environment(mode):
     ours = vector(PATH, 4, autoreset_mode=mode, **SHORT)
@@ -131,7 +118,6 @@ def test_a_vector_environment_says_what_is_wrong(mariner):
         ({"num_envs": 0}, "num_envs: expected"),
         ({"sae": "calm"}, "Did you mean 'sea'"),
         ({"autoreset_mode": "later"}, "autoreset_mode: expected one of .* got 'later'"),
-        ({"threads": 0}, "threads: expected"),
         (
             {"render_mode": "human"},
             "render_mode: expected one of 'rgb_array', or None, got 'human'",
