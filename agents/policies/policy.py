@@ -318,7 +318,7 @@ class LearnedPolicy:
         if "task" in self.env_options:
             return
         definition = read_definition(task_showing(self.observation_names))
-        options = {
+        options: dict[str, Any] = {
             "action": self.action,
             "roll": "roll" in self.observation_names,
         }

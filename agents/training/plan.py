@@ -18,6 +18,7 @@ from agents.training.settings import (
 )
 from agents.training.yardsticks import half_reward_cost
 from shipgym.checks import check_choice, check_whole
+from shipgym.envs.environment import PACE
 from shipgym.envs.episode import as_json
 from shipgym.errors import InputError
 
@@ -159,6 +160,10 @@ def _task(
     options: Mapping[str, Any],
 ) -> BenchmarkTask:
     """Return environment, model and options."""
+    for name in options.keys() & set(PACE):
+        raise InputError(
+            f"--option {name}: expected a setting of learning: --set {name}"
+        )
     known = read_environment(environment or "course-keeping")
     of_sea = {} if sea is None else {"sea": sea}
     keywords = {**known.options, **of_sea, **options}

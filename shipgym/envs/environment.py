@@ -26,9 +26,7 @@ from shipgym.envs.engine import Engine, as_array, episode_key
 from shipgym.envs.pace import Frames, Pace, PacedSteps
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
-from shipgym.instruments.sensor_set import read_sensors
 from shipgym.models import ShipModel, load_model
-from shipgym.tasks.definition import read_definition
 from shipgym.tasks.task import Task
 
 if TYPE_CHECKING:
@@ -54,15 +52,9 @@ def read_options(
     `taken`: further keywords of its caller, for messages. Raises InputError for an
     unknown model or keyword, or a value out of its range.
     """
-    definition = read_definition(task, options.get("reward"))
-    sensors = options.get("sensors")
-    if sensors is not None:
-        sensors = read_sensors(sensors)
-    own = Task.option_names(definition, sensors)
-    known = dict.fromkeys([*taken, "reward", *own, *Randomisation.names()])
-    check_keys(options, known, "environment options")
-    randomisation, rest = Randomisation.take_from(options)
-    rest.pop("reward", None)
+    randomisation, own = Randomisation.take_from(options)
+    known = (*taken, *Randomisation.names())
+    chosen = Task.of(task, known, **own)
     if isinstance(model, Mapping):  # of a spec that was written as JSON
         model = ShipModel.from_dict(model)
     elif not isinstance(model, str | Path | ShipModel):
@@ -70,7 +62,7 @@ def read_options(
             "model", "a name, the path of a model file, or a ShipModel", model
         )
     ship = model if isinstance(model, ShipModel) else load_model(model)
-    return ship, Task.of(definition, **rest), randomisation
+    return ship, chosen, randomisation
 
 
 def spaces(task: Task, model: ShipModel, frame_stack: int = 1) -> tuple[Any, Space]:

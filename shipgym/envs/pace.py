@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from shipgym.arrays import Flags
 from shipgym.checks import check_number, check_whole
-from shipgym.engine.episodes import REFUSED
 from shipgym.engine.lane_records import CONSTRAINT
 from shipgym.envs.engine import Engine
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES
@@ -106,12 +105,6 @@ class PacedSteps:
         if begin_ended and over.any():
             engine.begin_next(over)
         return n_ended
-
-    def step_of_one(self) -> int:
-        """Take a step of one ship, as what `Engine.step_of_one` returns does."""
-        if not np.isfinite(self.engine.command).all():
-            return REFUSED
-        return self.advance()
 
     def _in_force(self) -> Float32:
         """Commands of the interval before, shape (n_commands, num_envs)."""

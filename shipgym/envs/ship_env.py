@@ -108,7 +108,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         self._shape = self._command.shape
         self._advance = engine.step_of_one()
         if self._paced is not None:
-            self._advance = self._paced.step_of_one
+            self._advance = self._paced.advance
 
     @property
     def waypoints(self) -> Floats | None:

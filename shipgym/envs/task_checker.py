@@ -168,11 +168,8 @@ def _seen_names(engine: Engine) -> list[str]:
 def _source_of(name: str, task: Task) -> str:
     """File that a number comes from, for messages."""
     definition = task.definition
-    if name.startswith("reward_"):
-        return definition.reward_source
-    if task.sensors is None or not name.startswith("Observation."):
-        return definition.source
-    return f"{definition.source}, or the sensors of {task.sensors.source}"
+    of_reward = name.startswith("reward_")
+    return definition.reward_source if of_reward else definition.source
 
 
 def _printed(engine: Engine) -> Iterator[str]:

@@ -160,18 +160,19 @@ class Task:
             )
 
     @classmethod
-    def of(cls, definition: Any, **options: Any) -> Self:
+    def of(cls, definition: Any, others: Sequence[str] = (), /, **options: Any) -> Self:
         """Make a task by keywords: those of all tasks, and the settings of its own.
 
-        Raises InputError for a keyword that it does not have, or a value out of range.
+        `others` are keywords of its caller, for messages. Raises InputError for a
+        keyword that it does not have, or a value out of range.
         """
         reward = options.pop("reward", None)
         task = read_definition(definition, reward)
         sensors = options.get("sensors")
         if sensors is not None:
             sensors = read_sensors(sensors)
-        known = cls.option_names(task, sensors)
-        check_keys(options, known, f"{task.name} options")
+        known = (*others, "reward", *cls.option_names(task, sensors))
+        check_keys(options, dict.fromkeys(known), f"{task.name} options")
 
         # an option belongs to the task, to all tasks or to the sensor set
         own = _chosen(options, task.settings)
