@@ -7,12 +7,14 @@ import numpy as np
 import pygame
 import pytest
 
-from shipgym.envs import rendering
+from shipgym.envs.rendering import CORRIDOR, HULL, WAKE
 from shipgym.sea import Current, Weather, Wind
+from shipgym.tasks.shapes import rgb
 
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
 LENGTH, BEAM = 160.93, 23.17  # of the Mariner
 METRES = 14.0 * LENGTH / 600
+ORDER, RUDDER, LINE = rgb("warning"), rgb("danger"), rgb("safe")
 TROUBLED = Weather(
     current=Current(0.8, towards_deg=90.0), wind=Wind(9.0, from_deg=200.0)
 )
@@ -47,7 +49,7 @@ def test_the_ship_is_to_scale_and_heads_where_she_heads():
     picture = sailed(env, 0)
     assert picture.shape == (600, 600, 3)
     assert picture.dtype == np.uint8
-    north, east = where(picture, rendering.HULL)
+    north, east = where(picture, HULL)
     heading = env.unwrapped.physical_state()["psi"]
     ahead = north * np.cos(heading) + east * np.sin(heading)
     aside = east * np.cos(heading) - north * np.sin(heading)
@@ -58,7 +60,7 @@ def test_the_ship_is_to_scale_and_heads_where_she_heads():
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_rudder_to_starboard_shows_to_starboard(side):
     env = make(COURSE, course_change_deg=0.0)
-    north, east = where(sailed(env, 20, side), rendering.RUDDER)
+    north, east = where(sailed(env, 20, side), RUDDER)
     heading = env.unwrapped.physical_state()["psi"]
     assert side * np.mean(east * np.cos(heading) - north * np.sin(heading)) > METRES
 
@@ -66,13 +68,13 @@ def test_a_rudder_to_starboard_shows_to_starboard(side):
 @pytest.mark.parametrize(
     ("name", "options", "shown", "absent"),
     [
-        (COURSE, {}, ["HULL", "ORDER", "WAKE", "RUDDER"], ["PATH", "CORRIDOR"]),
-        (PATH, {"sea": TROUBLED}, ["PATH", "CORRIDOR", "WAKE"], []),
+        (COURSE, {}, [HULL, ORDER, WAKE, RUDDER], [LINE, CORRIDOR]),
+        (PATH, {"sea": TROUBLED}, [LINE, CORRIDOR, WAKE], []),
     ],
 )
 def test_environments_show_what_there_is(name, options, shown, absent):
     picture = sailed(make(name, **options))
-    assert [shows(picture, getattr(rendering, one)) for one in shown + absent] == [
+    assert [shows(picture, one) for one in shown + absent] == [
         *[True] * len(shown),
         *[False] * len(absent),
     ]
