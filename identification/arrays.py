@@ -1,12 +1,11 @@
-"""Means of squares, stretches of samples, and values by name."""
+"""Means of squares, and values by name."""
 
 from collections.abc import Iterable
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.arrays import Flags, Floats
+from shipgym.arrays import Floats
 
 
 def mean_square(values: Floats) -> float:
@@ -24,18 +23,10 @@ def column_rms(table: Floats) -> Floats:
     return np.asarray(np.sqrt(np.mean(table**2, axis=0)))
 
 
-def stretches(is_break: Flags, fewest: int) -> list[slice]:
-    """Stretches of samples between breaks, those of at least `fewest` samples.
-
-    `is_break`, shape (n_samples - 1,), tells of each step whether it is a break.
-    """
-    starts = np.flatnonzero(is_break) + 1
-    edges = [0, *starts.tolist(), len(is_break) + 1]
-    found = []
-    for start, stop in pairwise(edges):
-        if stop - start >= fewest:
-            found.append(slice(start, stop))
-    return found
+def rounded(values: Floats) -> Floats:
+    """Values to eight significant digits, for a small file."""
+    written = [float(f"{value:.8g}") for value in values.ravel()]
+    return np.array(written).reshape(values.shape)
 
 
 def by_name(names: Iterable[str], values: NDArray[np.floating]) -> dict[str, float]:

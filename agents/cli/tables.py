@@ -91,7 +91,6 @@ def selection_table(ranking: Mapping[str, Any]) -> Table:
         "model",
         ">log likeli-\nhood lost",
         ">heading\ndeg",
-        ">yaw rate\ndeg/s",
         ">ran away\ntrials",
     )
     for entry in ranking["ranking"]:
@@ -102,7 +101,6 @@ def selection_table(ranking: Mapping[str, Any]) -> Table:
             "stable" if entry["stable"] else Text("unstable", "bold red"),
             number(entry["loss"], 3),
             number(entry["heading_deg"], 2),
-            number(entry["yaw_rate_deg_s"], 4),
             number(entry["ran_away"], 0),
         )
     return table

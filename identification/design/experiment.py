@@ -37,8 +37,6 @@ class Advice:
     ----------
     coefficient : str
         That whose standard error is shrunk.
-    information : dict of str to float
-        On it, of the trials so far.
     before : dict of str to float
         Relative standard error of each coefficient from the trials so far.
     steps : tuple of dict of str to float
@@ -51,7 +49,6 @@ class Advice:
     """
 
     coefficient: str
-    information: dict[str, float]
     before: dict[str, float]
     steps: tuple[dict[str, float], ...]
     chosen: tuple[str, ...]
@@ -61,7 +58,6 @@ class Advice:
         """Plain values, ready for JSON."""
         return {
             "coefficient": self.coefficient,
-            "information": self.information,
             "relative_errors": {"now": self.before, "expected": self.after},
             "gains": list(self.steps),
             "run_next": list(self.chosen),
@@ -97,22 +93,18 @@ def standard_candidates(model: ShipModel) -> dict[str, Candidate]:
     """
     travel = model.travel_time
     times: dict[str, Any] = {"duration": 40.0 * travel, "dt": travel / 60}
+    weave = partial(zigzag, must_reverse=False, **times)
+    turn = partial(turning_circle, **times)
     limit = model.steering.rudder_limit_deg
     found: dict[str, Candidate] = {}
     for angle in (5.0, 10.0, 20.0, min(35.0, limit)):
-        if angle > limit:
-            continue
-        both: dict[str, Any] = {
-            "rudder_deg": angle,
-            "heading_deg": angle,
-            "must_reverse": False,
-        }
-        found |= {
-            f"zigzag {angle:g}/{angle:g}": partial(zigzag, **both, **times),
-            f"turning circle {angle:g}": partial(
-                turning_circle, rudder_deg=angle, **times
-            ),
-        }
+        if angle <= limit:
+            found |= {
+                f"zigzag {angle:g}/{angle:g}": partial(
+                    weave, rudder_deg=angle, heading_deg=angle
+                ),
+                f"turning circle {angle:g}": partial(turn, rudder_deg=angle),
+            }
     return found
 
 
@@ -148,10 +140,14 @@ def advise(
         raise InputError(
             "trials: expected those that the model was identified from, got none"
         )
+    if not isinstance(model.dynamics, Structure):
+        raise InputError(
+            "structure: expected a table of terms, such as 'abkowitz', got"
+            f" {model.structure!r}"
+        )
     regressions = [_regression(model, trial) for trial in trials]
     noise = _noise_variance(model, regressions)
-    known = [_information(model, samples, noise) for samples in regressions]
-    total = np.sum(known, axis=0)
+    total = np.sum([_information(model, rows, noise) for rows in regressions], axis=0)
     values = np.array(list(model.coefficients.values()))
     errors = _relative_errors(total, np.ones(len(values)))
     size = np.where(values, np.abs(values), errors)
@@ -163,52 +159,33 @@ def advise(
     check_choice(coefficient, names, "coefficient")
     place = names.index(coefficient)
     offers = _offers(model, candidates or standard_candidates(model), noise)
-    steps, chosen = _plan(
-        total,
-        offers,
-        size,
-        place,
-        number,
-    )
-    total = total + np.sum([offers[name] for name in chosen], axis=0)
+    steps, chosen = [], []
+    for _ in range(number):
+        gains = _gains(total, offers, size, place)
+        steps.append(gains)
+        chosen.append(_descending(gains)[0])
+        total = total + offers[chosen[-1]]
     return Advice(
         coefficient=coefficient,
-        information=by_name(
-            (trial.name for trial in trials), np.array(known)[:, place, place]
-        ),
         before=by_name(names, before),
-        steps=steps,
-        chosen=chosen,
+        steps=tuple(steps),
+        chosen=tuple(chosen),
         after=by_name(names, _relative_errors(total, size)),
     )
 
 
-def _plan(
-    total: Floats, offers: Mapping[str, Floats], size: Floats, place: int, number: int
-) -> tuple[tuple[dict[str, float], ...], tuple[str, ...]]:
-    """Gains of the candidates, and the one chosen, of each choice after the other."""
-    steps: list[dict[str, float]] = []
-    chosen: list[str] = []
-    for _ in range(number):
-        now = _relative_errors(total, size)[place]
-        gains = {
-            name: float(now / _relative_errors(total + offer, size)[place])
-            for name, offer in offers.items()
-        }
-        steps.append(gains)
-        chosen.append(_descending(gains)[0])
-        total = total + offers[chosen[-1]]
-    return tuple(steps), tuple(chosen)
-
-
-def _table(model: ShipModel) -> Structure:
-    """The table of terms of a model; InputError for equations written by hand."""
-    if not isinstance(model.dynamics, Structure):
-        raise InputError(
-            "structure: expected a table of terms, such as 'abkowitz', got"
-            f" {model.structure!r}"
-        )
-    return model.table
+def _gains(
+    total: Floats,
+    offers: Mapping[str, Floats],
+    size: Floats,
+    place: int,
+) -> dict[str, float]:
+    """By what factor each candidate shrinks the error of a coefficient."""
+    now = _relative_errors(total, size)[place]
+    return {
+        name: float(now / _relative_errors(total + offer, size)[place])
+        for name, offer in offers.items()
+    }
 
 
 def _regression(model: ShipModel, trial: Trial) -> Samples:
@@ -217,7 +194,7 @@ def _regression(model: ShipModel, trial: Trial) -> Samples:
     window = max(round(share * model.travel_time / usual_step(trial.t)), 1)
     return build_samples(
         [trial],
-        _table(model),
+        model.table,
         model.particulars,
         "integral",
         min(window, max(len(trial) // 10, 1)),
@@ -231,7 +208,7 @@ def _noise_variance(
     """Variance of what the model leaves of the targets, by equation."""
     accelerations = _accelerations(model)
     noise = {}
-    for q, rows in _table(model).regression_rows.items():
+    for q, rows in model.table.regression_rows.items():
         targets = np.concatenate([samples.targets[q] for samples in regressions])
         features = np.concatenate([samples.features[q] for samples in regressions])
         # data without noise leave rounding errors only
@@ -256,7 +233,7 @@ def _information(
     """
     matrix = model.acceleration_matrix
     of_terms = np.zeros(matrix.shape)
-    for q, rows in _table(model).regression_rows.items():
+    for q, rows in model.table.regression_rows.items():
         X = samples.features[q]
         of_terms[rows, rows] = X.T @ X / noise[q]
     return np.asarray(matrix.T @ of_terms @ matrix)
@@ -278,7 +255,7 @@ def _felt_per_unit(model: ShipModel) -> Floats:
     By the size of all its terms, in the equation where it is largest, shape
     (n_coefficients,).
     """
-    table = _table(model)
+    table = model.table
     sizes = hard_turn_features(
         table,
         model.particulars,

@@ -108,8 +108,7 @@ class _Regression:
             y,
             cv=KFold(FOLDS),
         )
-        with np.errstate(divide="ignore"):  # infinite for a coefficient of 0
-            errors = np.sqrt(np.diag(estimator.covariance_)) / np.abs(estimator.coef_)
+        errors = _relative_errors(estimator, y - X @ estimator.coef_)
         return ReductionStep(
             terms=names,
             changed=changed,
@@ -122,6 +121,14 @@ class _Regression:
     def _explained(self, predicted: Floats) -> float:
         """Share of the targets that a prediction explains."""
         return 1.0 - mean_square(self.targets - predicted) / mean_square(self.targets)
+
+
+def _relative_errors(estimator: TruncatedLSSVM, left: Floats) -> Floats:
+    """Standard errors by the sizes of the coefficients, from what the fit left."""
+    variance = left @ left / max(len(left) - estimator.rank_, 1)
+    deviations = np.sqrt(variance * np.diag(estimator.inverse_moment_))
+    with np.errstate(divide="ignore"):  # infinite for a coefficient of 0
+        return np.asarray(deviations / np.abs(estimator.coef_))
 
 
 def backward_elimination(

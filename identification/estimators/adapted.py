@@ -9,17 +9,17 @@ from identification.arrays import column_rms, root_mean_square
 from identification.estimators.decomposition import scales_of
 from identification.estimators.linear import LinearRegressor, validated
 from shipgym import InputError
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 
 
 class Adapted(LinearRegressor):
-    """An estimator with scikit-learn's interface, given one scale, and a covariance.
+    """An estimator with scikit-learn's interface, given one scale, and a moment.
 
     It sees columns and targets of root mean square 1: raw columns span 5e-3 to 300, and
-    a penalty, or a prior, that is the same for all of them would mean nothing. Moment
-    and covariance are those of least squares on the features whose coefficients are not
-    0: an approximation for an estimator that shrinks its coefficients. `inner` has a
-    `fit(X, y)` that sets `coef_`.
+    a penalty, or a prior, that is the same for all of them would mean nothing. The
+    moment is that of least squares on the features whose coefficients are not 0: an
+    approximation for an estimator that shrinks its coefficients. `inner` has a `fit(X,
+    y)` that sets `coef_`.
     """
 
     def __init__(self, inner: Any) -> None:
@@ -41,17 +41,13 @@ class Adapted(LinearRegressor):
             )
         self.coef_ *= unit / scale
 
-        self._set_covariance(features, targets)
+        self.inverse_moment_ = _inverse_moment(features, self.coef_ != 0.0)
         return self
 
-    def _set_covariance(self, features: Floats, targets: Floats) -> None:
-        """Set moment and covariance as of least squares on the features in use."""
-        is_used = self.coef_ != 0.0
-        used = features[:, is_used]
-        inverse = np.zeros((len(is_used), len(is_used)))
-        moment = used.T @ used
-        inverse[np.ix_(is_used, is_used)] = np.linalg.pinv(moment, hermitian=True)
-        residuals = targets - features @ self.coef_
-        freedom = max(len(targets) - len(moment), 1)
-        self.inverse_moment_ = inverse
-        self.covariance_ = float(residuals @ residuals) / freedom * inverse
+
+def _inverse_moment(features: Floats, is_used: Flags) -> Floats:
+    """That of least squares on the features in use."""
+    used = features[:, is_used]
+    inverse = np.zeros((len(is_used), len(is_used)))
+    inverse[np.ix_(is_used, is_used)] = np.linalg.pinv(used.T @ used, hermitian=True)
+    return inverse

@@ -24,22 +24,20 @@ def residuals(estimators: Estimators, samples: Samples) -> dict[str, Floats]:
 def joint_covariance(
     estimators: Estimators,
     samples: Samples,
-    memory: float = 0.0,
+    memory: float,
 ) -> Floats:
     """Covariance of the coefficients of all equations.
 
     With the coefficients of each equation a linear map of its targets, the covariance
-    follows from that of the residuals. Without memory they are independent in time
-    (classical formula, with the covariance of the residuals between equations); with
-    memory it is estimated as by Newey & West 1987 (Econometrica 55(3)) with Bartlett's
-    weights, each trial by itself. Exact features are assumed. Of an estimator that
-    weights its samples it is the residuals times their weights that count (Huber's
-    sandwich). `estimators`: fitted to `samples` without intercept, by equation;
-    `samples`: the regression; `memory`: time over which residuals are taken to be
-    correlated, s. Returns the covariance in the order of the equations and their
+    follows from that of the residuals, estimated as by Newey & West 1987 (Econometrica
+    55(3)) with Bartlett's weights, each trial by itself. Exact features are assumed. Of
+    an estimator that weights its samples it is the residuals times their weights that
+    count (Huber's sandwich). `estimators`: fitted to `samples` without intercept, by
+    equation; `samples`: the regression; `memory`: time over which residuals are taken
+    to be correlated, s. Returns the covariance in the order of the equations and their
     features, shape (n_coefficients, n_coefficients).
     """
-    maps, errors = [], []
+    scores = []
     unweighted = residuals(estimators, samples)
     for q, estimator in estimators.items():
         X = samples.features[q]
@@ -47,31 +45,19 @@ def joint_covariance(
         # scaled to the variance of errors, of which fitting takes a part
         freedom = effective_freedom(estimator, X)
         scale = np.sqrt(len(samples) / freedom)
-        weighted = unweighted[q] * counts
-        errors.append(weighted * scale)
-        maps.append(X @ estimator.inverse_moment_)
-    if memory <= 0.0:
-        return _without_memory(maps, errors)
-    return _with_memory(maps, errors, samples, memory)
-
-
-def _without_memory(maps: list[Floats], errors: list[Floats]) -> Floats:
-    """Covariance for errors that are independent in time."""
-    pairs = list(zip(maps, errors, strict=True))
-    return np.block(
-        [[own @ other / len(own) * (M.T @ N) for N, other in pairs] for M, own in pairs]
+        errors = unweighted[q] * counts * scale
+        scores.append(X @ estimator.inverse_moment_ * errors[:, None])
+    return _long_run(
+        np.hstack(scores),
+        samples,
+        memory,
     )
 
 
-def _with_memory(
-    maps: list[Floats],
-    errors: list[Floats],
-    samples: Samples,
-    memory: float,
-) -> Floats:
-    """Covariance for errors that last, each trial by itself."""
-    scores = np.hstack([M * own[:, None] for M, own in zip(maps, errors, strict=True)])
-    total = np.zeros((scores.shape[1], scores.shape[1]))
+def _long_run(scores: Floats, samples: Samples, memory: float) -> Floats:
+    """Covariance by scores, shape (n_rows, n_coefficients), each trial by itself."""
+    n_coefficients = scores.shape[1]
+    total = np.zeros((n_coefficients, n_coefficients))
     for trial in np.unique(samples.trial):
         own = samples.trial == trial
         start = samples.start[own]

@@ -63,11 +63,11 @@ class Decomposition:
         rounding = largest_side * np.finfo(float).eps * s[0]
         return max(int(np.sum(s > rounding)), 1)
 
-    def filters(self, C: float, rank: int) -> Floats:
-        """Factors s / (s^2 + 1/C) of directions, 0 beyond `rank` and below rounding."""
+    def filters(self, C: float) -> Floats:
+        """Factors s / (s^2 + 1/C) of directions, 0 below rounding."""
         s = self.singular_values
         filters = np.zeros(len(s))
-        kept = slice(min(rank, self.numerical_rank))
+        kept = slice(self.numerical_rank)
         if s[0] > 0.0:
             filters[kept] = s[kept] / (s[kept] ** 2 + 1.0 / C)
         return filters
@@ -84,47 +84,29 @@ class Decomposition:
         unscaled = self.directions[used] / self.scale
         return np.asarray((unscaled.T * inverse) @ unscaled)
 
-    def unit_covariance(self, filters: Floats) -> Floats:
-        """Covariance of the coefficients for noise of unit variance."""
-        root = self.directions.T * filters / self.scale[:, None]
-        return np.asarray(root @ root.T)
-
-    def noise_variance(self, filters: Floats, residuals: Floats) -> float:
-        """Variance of the noise by the degrees of freedom; NaN if there are none."""
-        freedom = self.n_free - float(self.singular_values @ filters)
-        if freedom <= 0.5:
-            return np.nan
-        return float(residuals @ residuals) / freedom
-
 
 def decompose(
     X: Floats,
     y: Floats,
     scale: bool | ArrayLike,
     fit_intercept: bool,
-    weights: Floats | None = None,
 ) -> Decomposition:
-    """Decompose the features of a regression; arguments as of `LSSVM`.
-
-    The weights, shape (n_samples,), are those of the squared errors.
-    """
-    root = 1.0 if weights is None else np.sqrt(weights)[:, None]
+    """Decompose the features of a regression; arguments as of `LSSVM`."""
     centre, mean = np.zeros(X.shape[1]), 0.0
     if fit_intercept:
-        centre = np.average(X, axis=0, weights=weights)
-        mean = float(np.average(y, weights=weights))
-    centred = (X - centre) * root
-    targets = ((y - mean)[:, None] * root).ravel()
+        centre, mean = X.mean(axis=0), float(y.mean())
+    centred = X - centre
+    y = y - mean
     size = column_rms(centred)
-    size[size <= CONSTANT * column_rms(X * root)] = 0.0
+    size[size <= CONSTANT * column_rms(X)] = 0.0
     scales = scales_of(size, scale)
 
     with single_threaded():
         left, singular_values, directions = np.linalg.svd(
             centred / scales, full_matrices=False
         )
-    projections = left.T @ targets
-    beyond = targets - left @ projections
+    projections = left.T @ y
+    beyond = y - left @ projections
     return Decomposition(
         singular_values=singular_values,
         directions=directions,
@@ -136,38 +118,6 @@ def decompose(
         scale=scales,
         n_samples=len(y),
     )
-
-
-def keep_solution(
-    estimator: Any,
-    problem: Decomposition,
-    filters: Floats,
-    X: Floats,
-    y: Floats,
-    weights: Floats | None,
-) -> Floats:
-    """Set the attributes of a linear estimator from its filtered decomposition.
-
-    Returns the residuals, shape (n_samples,).
-    """
-    coefficients = problem.coefficients(filters)
-    intercept = problem.mean - float(problem.centre @ coefficients)
-    residuals: Floats = y - X @ coefficients - intercept
-
-    # Huber's sandwich: the residuals that count are the weighted ones, the moment is
-    # that of all samples
-    counts = np.ones(len(y)) if weights is None else weights
-    noise_variance = problem.noise_variance(filters, residuals * counts)
-    inflation = len(y) / float(counts.sum())
-    vars(estimator).update(
-        coef_=coefficients,
-        intercept_=intercept,
-        singular_values_=problem.singular_values,
-        inverse_moment_=problem.inverse_moment(filters),
-        noise_variance_=noise_variance,
-        covariance_=noise_variance * inflation * problem.unit_covariance(filters),
-    )
-    return residuals
 
 
 def scales_of(size: Floats, scale: bool | ArrayLike) -> Floats:

@@ -1,14 +1,10 @@
-"""Interface of the estimators that `identify` fits, and what a method may use."""
+"""Interface of the estimators that `identify` fits."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from identification.samples.samples import Samples
-from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
 
 
@@ -21,9 +17,6 @@ class Estimator(Protocol):
     """
 
     coef_: Floats  # coefficients of the features as given, shape (n_features,)
-    #: of `coef_`, for exact features and independent errors, shape (n_features,
-    #: n_features)
-    covariance_: Floats
     #: regularised inverse M of X' W X: `coef_` is M X' W y with W the weights, shape
     #: (n_features, n_features)
     inverse_moment_: Floats
@@ -39,24 +32,6 @@ def weights(estimator: Estimator, features: Floats) -> Floats:
     """Weight of each sample, shape (n_samples,), 1 where the estimator knows none."""
     given: Floats | None = getattr(estimator, "weights_", None)
     return np.ones(len(features)) if given is None else given
-
-
-@dataclass(frozen=True, eq=False)
-class FitTask:
-    """Data and settings that a method may use."""
-
-    samples: Samples  # the regression of each equation
-    blank: ShipModel  # the model but for its coefficients
-    trials: Sequence[Trial]  # those behind the samples
-
-    def without(self, trials: Sequence[int]) -> Self:
-        """The task of the other trials, by their places."""
-        others = np.setdiff1d(range(len(self.trials)), trials)
-        return replace(
-            self,
-            samples=self.samples.select(np.isin(self.samples.trial, others)),
-            trials=[self.trials[place] for place in others],
-        )
 
 
 Estimators = dict[str, Estimator]

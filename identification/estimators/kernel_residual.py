@@ -34,7 +34,12 @@ class KernelResidual:
         from shipgym.ships.kernel_boxes import RBF, SIZES  # most runs have no kernel
 
         check_choice(self.kernel, (RBF,), "kernel")
-        check_whole(self.centres, "centres", at_least=2, at_most=SIZES[-1])
+        check_whole(
+            self.centres,
+            "centres",
+            at_least=2,
+            at_most=SIZES[-1],
+        )
         if self.length is not None:
             check_number(self.length, "length", above=0.0)
         if self.C is not None:

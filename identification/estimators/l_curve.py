@@ -1,4 +1,4 @@
-"""Rank of a truncated decomposition: L-curve and generalised cross-validation."""
+"""Rank of a truncated decomposition by its L-curve."""
 
 from dataclasses import dataclass
 
@@ -35,7 +35,7 @@ def l_curve(problem: Decomposition, filters: Floats) -> LCurve:
     )
 
 
-def corner_rank(curve: LCurve, n_samples: int, significance: float = 0.1) -> int:
+def corner_rank(curve: LCurve, n_samples: int) -> int:
     """Rank, from 1 to n_ranks, at the corner of the L-curve (Xu 2020, section 3.2).
 
     The corner is the point farthest towards the origin of the doubly logarithmic curve,
@@ -52,8 +52,6 @@ def corner_rank(curve: LCurve, n_samples: int, significance: float = 0.1) -> int
         Of all ranks.
     n_samples : int
         Number of samples fitted.
-    significance : float
-        Level of the F test.
     """
     residual = curve.residual_norm
     machine = np.finfo(float)
@@ -70,33 +68,15 @@ def corner_rank(curve: LCurve, n_samples: int, significance: float = 0.1) -> int
     # once: as array and as number a square may differ in the last bit
     squared = residual * residual
     least = max(squared[-1], floor**2)
-    allowed = _allowed_growth(full, freedom, significance)
+    allowed = _allowed_growth(full, freedom)
     is_adequate = squared <= allowed * least
     passed_over = np.argmax(is_adequate[corner - 1 :])
     return corner + int(passed_over)
 
 
-def _allowed_growth(full: int, freedom: int, significance: float) -> Floats:
+def _allowed_growth(full: int, freedom: int) -> Floats:
     """Growth of the squared residuals that chance explains, of each rank (F test)."""
+    significance = 0.1
     dropped = np.arange(full)[::-1]
-    numerator = np.maximum(dropped, 1)
-    probability = 1.0 - significance
-    quantile = fdtri(
-        numerator,
-        freedom,
-        probability,
-    )
-    growth = dropped / freedom * quantile
-    return np.asarray(1.0 + growth)
-
-
-def gcv_rank(curve: LCurve, n_samples: int) -> int:
-    """Rank that minimises generalised cross-validation (Golub, Heath & Wahba 1979)."""
-    n_ranks = len(curve.residual_norm)
-    ranks = np.arange(1, n_ranks + 1)
-    freedom = n_samples - ranks
-    divisor = np.maximum(freedom, 1) ** 2
-    score = curve.residual_norm**2 / divisor
-    score[freedom <= 0] = np.inf
-    best = np.argmin(score)
-    return int(ranks[best])
+    quantile = fdtri(np.maximum(dropped, 1), freedom, 1.0 - significance)
+    return np.asarray(1.0 + dropped / freedom * quantile)

@@ -16,17 +16,14 @@ from identification.estimators.decomposition import (
     Decomposition,
     check_scale,
     decompose,
-    keep_solution,
 )
 from identification.estimators.l_curve import (
     corner_rank,
-    gcv_rank,
     l_curve,
 )
 from identification.estimators.linear import LinearRegressor, check_weight, validated
-from identification.estimators.robust import fit_weighted
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_flag, check_number, check_whole
+from shipgym.checks import check_choice, check_number, check_whole
 
 
 @dataclass(eq=False, repr=False)
@@ -47,9 +44,6 @@ class LSSVM(LinearRegressor):
         features as given.
     fit_intercept : bool
         Whether b is free or zero.
-    robust : bool
-        Whether outliers lose their influence: samples are weighted by their residuals
-        until the weights converge (Suykens et al. 2002).
 
     Attributes
     ----------
@@ -59,53 +53,49 @@ class LSSVM(LinearRegressor):
         b.
     singular_values_ : array of shape (n_directions,)
         Of the centred and scaled features.
-    covariance_ : array of shape (n_features, n_features)
-        Of `coef_`, for exact features and independent errors.
     inverse_moment_ : array of shape (n_features, n_features)
         Regularised inverse of X'X (X centred): `coef_` is `inverse_moment_ @ X.T @ y`.
-    noise_variance_ : float
-        From the residuals and the effective degrees of freedom.
-    weights_ : array of shape (n_samples,)
-        Of the samples; 1 but for outliers.
     n_features_in_ : int
         Number of features.
     """
 
     name: ClassVar[str] = "ls-svm"
-    options: ClassVar[tuple[str, ...]] = ("C", "scale", "robust")
+    options: ClassVar[tuple[str, ...]] = ("C", "scale")
 
     C: float = 1e6
     kernel: str = "linear"
     scale: bool | ArrayLike = True
     fit_intercept: bool = True
-    robust: bool = False
 
     def check(self) -> None:
         """Refuse settings that cannot be, by an InputError that names the setting."""
-        check_choice(self.kernel, ("linear",), "kernel")
+        check_choice(
+            self.kernel,
+            ("linear",),
+            "kernel",
+        )
         check_weight(self.C)
         check_scale(self.scale)
-        check_flag(self.robust, "robust")
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Fit to samples (n_samples, n_features) and targets (n_samples,)."""
         self.check()
         features, targets = validated(self, X, y)
-        self.weights_ = fit_weighted(
-            lambda weights: self._fit_primal(features, targets, weights),
-            y=targets,
-            robust=self.robust,
-        )
+        problem = decompose(features, targets, self.scale, self.fit_intercept)
+        filters = self._filters(problem)
+        self.coef_ = problem.coefficients(filters)
+        self.intercept_ = problem.mean - float(problem.centre @ self.coef_)
+        self.singular_values_ = problem.singular_values
+        self.inverse_moment_ = problem.inverse_moment(filters)
         return self
 
     def error_weight(self) -> float:
         """Weight of the squared errors in the solution."""
         return self.C
 
-    def _fit_primal(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
-        problem = decompose(X, y, self.scale, self.fit_intercept, weights)
-        filters = problem.filters(self.error_weight(), X.shape[1])
-        return keep_solution(self, problem, filters, X, y, weights)
+    def _filters(self, problem: Decomposition) -> Floats:
+        """Factors of the directions."""
+        return problem.filters(self.error_weight())
 
 
 @dataclass(eq=False, repr=False)
@@ -122,20 +112,16 @@ class TruncatedLSSVM(LSSVM):
         Weight of the errors; infinity truncates without penalty.
     rank : int or None, at least 1
         Number of directions to keep; None leaves it to `selection`.
-    selection : {"l-curve", "gcv", "full"}
-        Choice of the rank: corner of the L-curve, generalised cross-validation, or
-        every direction above rounding.
+    selection : {"l-curve", "full"}
+        Choice of the rank: corner of the L-curve, or every direction above rounding.
     scale : bool or array-like of shape (n_features,)
         As of `LSSVM`.
     fit_intercept : bool
         As of `LSSVM`.
-    robust : bool
-        As of `LSSVM`.
 
     Attributes
     ----------
-    coef_, intercept_, singular_values_, covariance_, inverse_moment_, noise_variance_,
-    weights_, n_features_in_
+    coef_, intercept_, singular_values_, inverse_moment_, n_features_in_
         As of `LSSVM`.
     rank_ : int
         Number of directions kept.
@@ -146,13 +132,7 @@ class TruncatedLSSVM(LSSVM):
     """
 
     name: ClassVar[str] = "tls-svm"
-    options: ClassVar[tuple[str, ...]] = (
-        "C",
-        "rank",
-        "selection",
-        "scale",
-        "robust",
-    )
+    options: ClassVar[tuple[str, ...]] = ("C", "rank", "selection", "scale")
 
     C: float = np.inf
     rank: int | None = None
@@ -161,29 +141,23 @@ class TruncatedLSSVM(LSSVM):
     def check(self) -> None:
         """Refuse settings that cannot be, by an InputError that names the setting."""
         super().check()
-        check_choice(self.selection, ("l-curve", "gcv", "full"), "selection")
+        check_choice(self.selection, ("l-curve", "full"), "selection")
         if self.rank is not None:
             check_whole(self.rank, "rank", at_least=1, hint="or None")
 
-    def _fit_primal(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
-        problem = decompose(X, y, self.scale, self.fit_intercept, weights)
-        distinct = problem.numerical_rank
-        filters = problem.filters(self.C, distinct)
+    def _filters(self, problem: Decomposition) -> Floats:
+        filters = super()._filters(problem)
         self.l_curve_ = l_curve(problem, filters)
-        self.rank_ = self._chosen_rank(problem, distinct)
+        self.rank_ = problem.numerical_rank
+        if self.rank is not None:
+            self.rank_ = min(self.rank, self.rank_)
+        elif self.selection == "l-curve":
+            self.rank_ = corner_rank(self.l_curve_, problem.n_free)
         filters[self.rank_ :] = 0.0
 
         dropped = problem.directions[self.rank_ :]
         self.collinear_groups_ = tuple(_main_features(row) for row in dropped)
-        return keep_solution(self, problem, filters, X, y, weights)
-
-    def _chosen_rank(self, problem: Decomposition, distinct: int) -> int:
-        if self.rank is not None:
-            return min(self.rank, distinct)
-        if self.selection == "full":
-            return distinct
-        choose = corner_rank if self.selection == "l-curve" else gcv_rank
-        return choose(self.l_curve_, problem.n_free)
+        return filters
 
 
 @dataclass(eq=False, repr=False)
@@ -194,12 +168,10 @@ class LeastSquares(TruncatedLSSVM):
     ----------
     scale : bool or array-like of shape (n_features,)
         Scales that tell rounding from what the data determine, as of `LSSVM`.
-    robust : bool
-        As of `LSSVM`.
     """
 
     name: ClassVar[str] = "ls"
-    options: ClassVar[tuple[str, ...]] = ("scale", "robust")
+    options: ClassVar[tuple[str, ...]] = ("scale",)
     regularised: ClassVar[bool] = False
 
     selection: str = "full"
@@ -215,12 +187,10 @@ class RidgeRegression(LSSVM):
         Penalty, the inverse of the weight of the errors.
     scale : bool or array-like of shape (n_features,)
         As of `LSSVM`.
-    robust : bool
-        As of `LSSVM`.
     """
 
     name: ClassVar[str] = "ridge"
-    options: ClassVar[tuple[str, ...]] = ("alpha", "scale", "robust")
+    options: ClassVar[tuple[str, ...]] = ("alpha", "scale")
 
     scale: bool | ArrayLike = False
     alpha: float = 1e-6

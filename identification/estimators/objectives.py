@@ -17,7 +17,7 @@ class ErrorOfC:
 
     Parameters
     ----------
-    X, y, scale, fit_intercept, weights
+    X, y, scale, fit_intercept
         As of `decompose`.
     parts : sequence of pairs of arrays of shape (n_samples,)
         Flags of the samples that are fitted, and of those predicted.
@@ -29,40 +29,25 @@ class ErrorOfC:
         y: Floats,
         scale: bool | ArrayLike,
         fit_intercept: bool,
-        weights: Floats | None,
         parts: Sequence[tuple[Flags, Flags]],
     ) -> None:
-        counts = np.ones(len(y)) if weights is None else weights
         self.n_samples = len(y)
         #: of each fit the squared singular values, and a triangle with the norm of its
         #: errors: what each direction explains by 1 / (s^2 + 1/C), then the targets
         self.fits = list[tuple[Floats, Floats]]()
         for fitted, predicted in parts:
-            fit = decompose(
-                X[fitted],
-                y[fitted],
-                scale,
-                fit_intercept,
-                counts[fitted],
-            )
+            fit = decompose(X[fitted], y[fitted], scale, fit_intercept)
             s = fit.singular_values[: fit.numerical_rank]
             along = (X[predicted] - fit.centre) / fit.scale @ fit.directions[: len(s)].T
             explained = along * fit.projections[: len(s)] * s
             errors = np.column_stack([explained, y[predicted] - fit.mean])
-            errors *= np.sqrt(counts[predicted])[:, None]
-            triangle = np.asarray(
-                np.linalg.qr(
-                    errors,
-                    mode="r",
-                )
-            )
-            self.fits.append((s**2, triangle))
+            self.fits.append((s**2, np.asarray(np.linalg.qr(errors, mode="r"))))
 
     def __call__(self, log_c: Floats) -> Floats:
-        """Mean squared errors, shape (n_candidates,), of log10 C (n_candidates, 1)."""
+        """Mean squared errors of values of log10 C, both of shape (n_candidates,)."""
         sums = np.zeros(len(log_c))
         for squares, triangle in self.fits:
-            shrinkage = 1.0 / (squares + 10.0**-log_c)
+            shrinkage = 1.0 / (squares + 10.0 ** -log_c[:, None])
             errors = triangle[:, -1] - shrinkage @ triangle[:, :-1].T
             sums += np.sum(
                 errors**2,

@@ -2,51 +2,43 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
-from typing import Any, NamedTuple
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from shipgym import InputError
 from shipgym.arrays import Floats, Integers
 from shipgym.checks import check_choice, check_whole
 
-#: Values of candidates, an array of shape (n_candidates, n_dimensions) ->
-#: (n_candidates,).
+#: Values of candidates, both of shape (n_candidates,).
 Objective = Callable[[Floats], Floats]
 
 
-class SearchResult(NamedTuple):
+@dataclass(eq=False)
+class SearchResult:
     """The outcome of a search."""
 
-    x: Floats  # the best candidate, shape (n_dimensions,)
-    value: float  # its objective
-    evaluations: int  # number of candidates evaluated
-
-
-@dataclass(eq=False)
-class Recorder:
-    """Evaluates candidates and keeps the best."""
-
     objective: Objective
-    x: Floats = field(default_factory=lambda: np.empty(0))  # the best candidate so far
+    x: float = np.nan  # the best candidate
     value: float = np.inf  # its objective
-    evaluations: int = 0
+    evaluations: int = 0  # number of candidates evaluated
 
-    def __call__(self, candidates: Floats) -> Floats:
+    def record(self, candidates: Floats) -> Floats:
         """Values of candidates; what is not a number counts as infinitely bad."""
         values = np.nan_to_num(self.objective(candidates), nan=np.inf, posinf=np.inf)
         self.evaluations += len(candidates)
         best = int(np.argmin(values))
-        if values[best] < self.value or not self.x.size:
-            self.x = candidates[best].copy()
+        if values[best] < self.value or np.isnan(self.x):
+            self.x = float(candidates[best])
             self.value = float(values[best])
         return values
 
 
 class Optimiser(ABC):
-    """Minimises an objective within a box; its settings are fields of a dataclass."""
+    """Minimises an objective in an interval; its settings are fields of a dataclass."""
+
+    name: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         for item in fields(self):  # type: ignore[arg-type]
@@ -56,29 +48,22 @@ class Optimiser(ABC):
                 )
 
     def minimise(
-        self, objective: Objective, bounds: ArrayLike, seed: int = 0
+        self, objective: Objective, bounds: tuple[float, float], seed: int = 0
     ) -> SearchResult:
         """Minimise an objective; the same seed gives the same search.
 
-        The objective gives values, shape (n_candidates,), of candidates of shape
-        (n_candidates, n_dimensions); the bounds, finite and the lower one first, have
-        shape (n_dimensions, 2).
+        The objective gives values of candidates, both of shape (n_candidates,); of the
+        bounds, which are finite, the lower one is first.
         """
-        record = Recorder(objective)
-        low, high = np.asarray(bounds, dtype=float).T
-        self._search(
-            record,
-            low,
-            high,
-            np.random.default_rng(seed),
-        )
-        return SearchResult(record.x, record.value, record.evaluations)
+        found = SearchResult(objective)
+        self._search(found, *bounds, np.random.default_rng(seed))
+        return found
 
     @abstractmethod
     def _search(
-        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
+        self, found: SearchResult, low: float, high: float, rng: np.random.Generator
     ) -> None:
-        """Evaluate candidates by `record`."""
+        """Evaluate candidates by `found`."""
 
 
 @dataclass(frozen=True)
@@ -91,29 +76,25 @@ class GridSearch(Optimiser):
     Parameters
     ----------
     points : int
-        In each dimension.
+        Of a grid.
     refinements : int
         Further grids, each between the neighbours of the best point so far.
     """
+
+    name: ClassVar[str] = "grid"
 
     points: int = 29
     refinements: int = 1
 
     def _search(
-        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
+        self, found: SearchResult, low: float, high: float, rng: np.random.Generator
     ) -> None:
         first, last = low, high
         for _ in range(self.refinements + 1):
-            axes = np.linspace(
-                first,
-                last,
-                self.points,
-            ).T
-            grid = np.meshgrid(*axes, indexing="ij")
-            record(np.stack(grid, axis=-1).reshape(-1, len(low)))
+            found.record(np.linspace(first, last, self.points))
             step = (last - first) / (self.points - 1)
-            first = np.maximum(record.x - step, low)
-            last = np.minimum(record.x + step, high)
+            first = max(found.x - step, low)
+            last = min(found.x + step, high)
 
 
 @dataclass(frozen=True)
@@ -135,6 +116,8 @@ class ParticleSwarm(Optimiser):
         Pull towards the best place of the particle and of the swarm.
     """
 
+    name: ClassVar[str] = "pso"
+
     particles: int = 20
     rounds: int = 60
     inertia: float = 0.7298
@@ -142,20 +125,15 @@ class ParticleSwarm(Optimiser):
     common: float = 1.49618
 
     def _search(
-        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
+        self, found: SearchResult, low: float, high: float, rng: np.random.Generator
     ) -> None:
-        place = _drawn(
-            self.particles,
-            low,
-            high,
-            rng,
-        )
-        values = record(place)
+        place = _drawn(self.particles, low, high, rng)
+        values = found.record(place)
         velocity = np.zeros(place.shape)
         best = place.copy()
         for _ in range(self.rounds):
             towards_own = rng.random(place.shape) * (best - place)
-            towards_common = rng.random(place.shape) * (record.x - place)
+            towards_common = rng.random(place.shape) * (found.x - place)
             velocity = self.inertia * velocity
             velocity += self.own * towards_own + self.common * towards_common
             moved = place + velocity
@@ -163,21 +141,21 @@ class ParticleSwarm(Optimiser):
             # a particle at a wall does not go on pushing against it
             velocity[moved != place] = 0.0
 
-            found = record(place)
-            better = found < values
+            reached = found.record(place)
+            better = reached < values
             best[better] = place[better]
-            values[better] = found[better]
+            values[better] = reached[better]
 
 
 @dataclass(frozen=True)
 class ArtificialBeeColony(Optimiser):
     """Artificial bee colony (Karaboga 2005; Zhu 2018, sections 5.2.1 and 5.2.2).
 
-    Employed bees move each food source along one dimension towards or away from
-    another; onlookers do the same to sources drawn by their fitness; a source that did
-    not improve for too long is left and drawn again. All bees of a stage move at once,
-    from the same sources, so that the objective is evaluated for a batch of candidates;
-    of several onlookers at one source the best counts.
+    Employed bees move each food source towards or away from another; onlookers do the
+    same to sources drawn by their fitness; a source that did not improve for too long
+    is left and drawn again. All bees of a stage move at once, from the same sources, so
+    that the objective is evaluated for a batch of candidates; of several onlookers at
+    one source the best counts.
 
     Parameters
     ----------
@@ -189,29 +167,31 @@ class ArtificialBeeColony(Optimiser):
         Moves without improvement after which a source is left.
     """
 
+    name: ClassVar[str] = "abc"
+
     sources: int = 20
     rounds: int = 30
     limit: int = 20
 
     def _search(
-        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
+        self, found: SearchResult, low: float, high: float, rng: np.random.Generator
     ) -> None:
         n = self.sources
         places = _drawn(n, low, high, rng)
-        values = record(places)
+        values = found.record(places)
         idle = np.zeros(n, dtype=int)  # moves since the last improvement
 
         def send_bees(chosen: Integers) -> None:
             """Move the chosen sources, and keep the moves that improve them."""
             moved = np.clip(_neighbours(places, chosen, rng), low, high)
-            found = record(moved)
+            reached = found.record(moved)
             np.add.at(idle, chosen, 1)
             # of several bees at one source the best is last, and stays
-            order = np.argsort(-found, kind="stable")
-            better = order[found[order] < values[chosen[order]]]
+            order = np.argsort(-reached, kind="stable")
+            better = order[reached[order] < values[chosen[order]]]
             improved = chosen[better]
             places[improved] = moved[better]
-            values[improved] = found[better]
+            values[improved] = reached[better]
             idle[improved] = 0
 
         for _ in range(self.rounds):
@@ -220,50 +200,39 @@ class ArtificialBeeColony(Optimiser):
             left = np.flatnonzero(idle > self.limit)
             if left.size:
                 places[left] = _drawn(left.size, low, high, rng)
-                values[left] = record(places[left])
+                values[left] = found.record(places[left])
                 idle[left] = 0
 
 
 def _neighbours(places: Floats, chosen: Integers, rng: np.random.Generator) -> Floats:
-    """Sources moved in one dimension each, towards or away from another.
+    """Sources moved towards or away from another.
 
     That is x + a (x - x of the other), with a in [-1, 1].
     """
-    n_sources, n_dimensions = places.shape
-    by_distance, by_axis, by_stride = rng.random((3, len(chosen)))
-    distance = 1 + (by_distance * (n_sources - 1)).astype(int)
-    other = (chosen + distance) % n_sources
-    bee, axis = np.arange(len(chosen)), (by_axis * n_dimensions).astype(int)
-    moved = places[chosen]
-    away = moved[bee, axis] - places[other, axis]
-    moved[bee, axis] += (2.0 * by_stride - 1.0) * away
-    return moved
+    # the dimension that a bee moves along would be drawn, too, were there several
+    by_distance, _, by_stride = rng.random((3, len(chosen)))
+    distance = 1 + (by_distance * (len(places) - 1)).astype(int)
+    away = places[chosen] - places[(chosen + distance) % len(places)]
+    return np.asarray(places[chosen] + (2.0 * by_stride - 1.0) * away)
 
 
 def _chances(values: Floats) -> Floats:
     """Cumulative chance of each source, by its fitness, shape (n_sources,)."""
     of_positive = 1.0 / (1.0 + np.maximum(values, 0.0))
-    fitness = np.where(
-        values >= 0.0,
-        of_positive,
-        1.0 - values,
-    )
-    if not 0.0 < fitness.sum() < np.inf:
+    fitness = np.where(values >= 0.0, of_positive, 1.0 - values)
+    if fitness.sum() == 0.0:
         fitness = np.ones(len(values))
     cumulative = fitness.cumsum()
     return np.asarray(cumulative / cumulative[-1])
 
 
-def _drawn(count: int, low: Floats, high: Floats, rng: np.random.Generator) -> Floats:
-    """Candidates evenly distributed in the box, shape (count, n_dimensions)."""
-    return low + (high - low) * rng.random((count, len(low)))
+def _drawn(count: int, low: float, high: float, rng: np.random.Generator) -> Floats:
+    """Candidates evenly distributed in the interval, shape (count,)."""
+    return low + (high - low) * rng.random(count)
 
 
-OPTIMISERS: dict[str, type[Optimiser]] = {
-    "abc": ArtificialBeeColony,
-    "pso": ParticleSwarm,
-    "grid": GridSearch,
-}
+KINDS = (ArtificialBeeColony, ParticleSwarm, GridSearch)
+OPTIMISERS: dict[str, type[Optimiser]] = {kind.name: kind for kind in KINDS}
 
 
 def get_optimiser(optimiser: str | Mapping[str, Any] | Optimiser) -> Optimiser:

@@ -74,9 +74,6 @@ class Recursion(LinearRegressor):
     ----------
     coef_ : array of shape (n_features,)
         Estimate after the last sample.
-    covariance_ : array of shape (n_features, n_features)
-        Of the least-squares estimate that the recursion tends to, for exact features
-        and independent errors (after `fit`).
     inverse_moment_ : array of shape (n_features, n_features)
         Inverse of X'WX plus the start's, with W the weights.
     weights_ : array of shape (n_samples,)
@@ -168,7 +165,9 @@ class Recursion(LinearRegressor):
         counts[picked] = 1.0
         counts[rest] = 1.0
         self.weights_ = counts * self._influence(n_samples)
-        self._summarise(features, targets)
+        of_samples = (scaled.T * self.weights_) @ scaled
+        inverse = np.linalg.inv(of_samples + np.eye(n_features) / self.C)
+        self.inverse_moment_ = inverse / np.outer(self.scale_, self.scale_)
         return history
 
     def _influence(self, n_samples: int) -> Floats:
@@ -181,23 +180,6 @@ class Recursion(LinearRegressor):
         # a sample is seen again while it is among the last
         times_seen = np.minimum(self.innovations, age + 1.0)
         return np.asarray(times_seen * self.forgetting**age)
-
-    def _summarise(self, features: Floats, targets: Floats) -> None:
-        """Set moment and covariance of the estimate that the recursion tends to."""
-        counts = self.weights_
-        scaled = features / self.scale_
-        n_features = scaled.shape[1]
-        start = np.eye(n_features) / self.C
-        of_samples = (scaled.T * counts) @ scaled
-        inverse = np.linalg.inv(of_samples + start)
-        errors = targets - features @ self.coef_
-        freedom = max(counts.sum() - np.sum(inverse * of_samples), 1.0)
-        self.noise_variance_ = float(counts @ errors**2) / freedom
-        middle = (scaled.T * counts**2) @ scaled
-        unscale = np.outer(self.scale_, self.scale_)
-        self.inverse_moment_ = inverse / unscale
-        sandwich = inverse @ middle @ inverse
-        self.covariance_ = self.noise_variance_ * sandwich / unscale
 
     @abstractmethod
     def _advance(self, phi: Floats, y: Floats, start: _Start, history: Floats) -> None:

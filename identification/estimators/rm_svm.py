@@ -18,13 +18,14 @@ from sklearn.base import clone
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.svm import SVR, LinearSVR
 
-from identification.arrays import column_rms, mean_square, root_mean_square
+from identification.arrays import column_rms, root_mean_square
 from identification.estimators.decomposition import scales_of
-from identification.estimators.estimator import Estimators, FitTask
+from identification.estimators.estimator import Estimators
 from identification.estimators.linear import LinearRegressor, validated
 from identification.estimators.pattern_search import pattern_search
 from identification.samples.folds import FOLDS, TRIALS, held_out_rows
 from identification.samples.prediction import predict
+from identification.samples.problem import Problem
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, check_number
@@ -62,7 +63,7 @@ class RMSVM(LinearRegressor):
     ----------
     coef_ : array of shape (n_features,)
         Of the features as given.
-    inverse_moment_, covariance_ : array of shape (n_features, n_features)
+    inverse_moment_ : array of shape (n_features, n_features)
         Of the ridge regression of the same strength, at C = 0 of the weakest: an SVR
         has none of its own.
     n_features_in_ : int
@@ -105,9 +106,13 @@ class RMSVM(LinearRegressor):
 
         # the uncertainty of no correction is that of the weakest
         strength = len(targets) / (weight or WEAKEST)
-        moment = features.T @ features + np.diag(strength * scale**2)
-        self.set_covariance(features, targets, moment)
+        self._set_moment(features, strength * scale**2)
         return self
+
+    def _set_moment(self, features: Floats, penalty: Floats) -> None:
+        """Set that of a ridge regression."""
+        moment = features.T @ features + np.diag(penalty)
+        self.inverse_moment_ = np.linalg.pinv(moment, hermitian=True)
 
     @property
     def weight_of_errors(self) -> float:
@@ -119,24 +124,14 @@ class RMSVM(LinearRegressor):
         """The insensitive band, where none is given a tenth."""
         return FIRST_BAND if self.epsilon is None else float(self.epsilon)
 
-    def set_covariance(self, features: Floats, targets: Floats, moment: Floats) -> None:
-        """Set that of the ridge regression whose regularised moment is given."""
-        self.inverse_moment_ = np.linalg.pinv(moment, hermitian=True)
-        residuals = targets - features @ self.coef_
-        self.covariance_ = mean_square(residuals) * self.inverse_moment_
-
-    def error(self, model: ShipModel, trial: Trial) -> float:
-        """What the search for the bands makes small."""
-        return heading_error(model, trial)
-
-    def fit_equations(self, task: FitTask) -> Estimators:
+    def fit_equations(self, problem: Problem) -> Estimators:
         """Copies fitted to all equations, weight and bands chosen where not given.
 
-        The model of `task` is the bare reference ship as a model of the target. Raises
-        InputError for a model without a reference ship.
+        The model of `problem` is the bare reference ship as a model of the target.
+        Raises InputError for a model without a reference ship.
         """
         self.check()
-        blank = task.blank
+        blank = problem.blank
         if not isinstance(blank.table, GreyBox):
             raise InputError(
                 "method 'rm-svm': expected structure 'grey-box', which has a reference"
@@ -144,11 +139,11 @@ class RMSVM(LinearRegressor):
                 " reference_model ('auto', a shipped model's name or a model file), or"
                 " choose another method, such as 'tls-svm'"
             )
-        tuner = _Tuner(self, task)
+        tuner = _Tuner(self, problem)
         weight = tuner.weight() if self.C is None else float(self.C)
         bands = tuner.bands(weight)
         found: Estimators = {}
-        for q, band in zip(task.samples.features, bands, strict=True):
+        for q, band in zip(problem.samples.features, bands, strict=True):
             found[q] = tuner.fitted(q, weight, band, tuner.everything)
             found[q].chosen_ = {"C": weight, "epsilon": band}  # type: ignore[attr-defined]
         return found
@@ -184,16 +179,16 @@ def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
 class _Tuner:
     """Fits with different settings, and simulations with what they give."""
 
-    def __init__(self, asked: RMSVM, task: FitTask, most_rows: int = 600) -> None:
+    def __init__(self, asked: RMSVM, problem: Problem, most_rows: int = 600) -> None:
         self.asked = asked
-        self.samples = task.samples
-        self.blank = task.blank
-        self.trials = task.trials
+        self.samples = problem.samples
+        self.blank = problem.blank
+        self.trials = problem.used
         # sequential minimal optimisation takes the square of the number of rows
-        n_rows = len(task.samples)
+        n_rows = len(problem.samples)
         self.every = max(1, math.ceil(n_rows / most_rows))
         self.everything = np.ones(n_rows, dtype=bool)
-        self.first_bands = [asked.band] * len(task.samples.features)
+        self.first_bands = [asked.band] * len(problem.samples.features)
         self._known: dict[tuple[Any, ...], RMSVM] = {}
 
     def fitted(self, equation: str, weight: float, band: float, rows: Flags) -> RMSVM:
@@ -247,7 +242,7 @@ class _Tuner:
 
         def error(bands: Floats) -> float:
             model = self.model(weight, bands.tolist(), self.everything)
-            errors = [self.asked.error(model, trial) for trial in self.trials]
+            errors = [heading_error(model, trial) for trial in self.trials]
             return float(np.mean(errors))
 
         found: list[float] = pattern_search(error, np.array(first)).tolist()

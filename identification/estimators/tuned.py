@@ -11,10 +11,10 @@ from identification.estimators.decomposition import check_scale
 from identification.estimators.linear import LinearRegressor, check_weight, validated
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.objectives import ErrorOfC, time_blocks
-from identification.estimators.optimisers import OPTIMISERS, Optimiser, get_optimiser
+from identification.estimators.optimisers import Optimiser, get_optimiser
 from shipgym import InputError
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_flag, check_whole
+from shipgym.checks import check_choice, check_whole
 
 
 @dataclass(eq=False, repr=False)
@@ -41,13 +41,10 @@ class TunedLSSVM(LinearRegressor):
         As of `LSSVM`.
     fit_intercept : bool
         As of `LSSVM`.
-    robust : bool
-        As of `LSSVM`; the blocks are then weighted as in the fit with the largest C.
 
     Attributes
     ----------
-    coef_, intercept_, singular_values_, covariance_, inverse_moment_, noise_variance_,
-    weights_, n_features_in_
+    coef_, intercept_, singular_values_, inverse_moment_, n_features_in_
         As of `LSSVM`.
     C_ : float
         The weight of the errors that was found.
@@ -62,7 +59,6 @@ class TunedLSSVM(LinearRegressor):
         "folds",
         "seed",
         "scale",
-        "robust",
     )
 
     optimiser: str | Mapping[str, Any] | Optimiser = "abc"
@@ -72,16 +68,12 @@ class TunedLSSVM(LinearRegressor):
     seed: int = 0
     scale: bool | ArrayLike = True
     fit_intercept: bool = True
-    robust: bool = False
 
     @property
     def method_name(self) -> str:
         """Name of the method by its search."""
-        kind = type(get_optimiser(self.optimiser))
-        for name, known in OPTIMISERS.items():
-            if kind is known:
-                return f"{'cv' if name == 'grid' else name}-lssvr"
-        return super().method_name
+        search = get_optimiser(self.optimiser).name
+        return f"{'cv' if search == 'grid' else search}-lssvr"
 
     def check(self) -> None:
         """Refuse settings that cannot be, by an InputError that names the setting."""
@@ -92,7 +84,6 @@ class TunedLSSVM(LinearRegressor):
         check_whole(self.folds, "folds", at_least=2)
         check_whole(self.seed, "seed", at_least=0)
         check_scale(self.scale)
-        check_flag(self.robust, "robust")
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Search for C and fit.
@@ -104,21 +95,24 @@ class TunedLSSVM(LinearRegressor):
         features, targets = validated(self, X, y)
         search = get_optimiser(self.optimiser).minimise(
             self._objective(features, targets),
-            bounds=[self._log_bounds()],
+            bounds=self._log_bounds(),
             seed=self.seed,
         )
-        self.C_ = 10.0 ** float(search.x[0])
+        self.C_ = 10.0**search.x
         self.chosen_ = {
             "C": self.C_,
             "objective": self.objective,
             "value": search.value,
             "evaluations": search.evaluations,
         }
-        fitted = self._estimator(self.C_).fit(features, targets)
-        for name, value in vars(fitted).items():
+        self._take(LSSVM(self.C_, "linear", self.scale, self.fit_intercept), X, y)
+        return self
+
+    def _take(self, own: LSSVM, X: ArrayLike, y: ArrayLike) -> None:
+        """Take what an estimator learns."""
+        for name, value in vars(own.fit(X, y)).items():
             if name.endswith("_"):
                 setattr(self, name, value)
-        return self
 
     def error_weight(self) -> float:
         """Weight of the squared errors in the solution."""
@@ -136,28 +130,9 @@ class TunedLSSVM(LinearRegressor):
             )
         return float(np.log10(low)), float(np.log10(high))
 
-    def _estimator(self, C: float) -> LSSVM:
-        return LSSVM(
-            C=C,
-            scale=self.scale,
-            fit_intercept=self.fit_intercept,
-            robust=self.robust,
-        )
-
     def _objective(self, X: Floats, y: Floats) -> ErrorOfC:
-        weights = None
-        if self.robust:
-            _, largest = self._log_bounds()
-            weights = self._estimator(10.0**largest).fit(X, y).weights_
         everything = np.ones(len(y), dtype=bool)
         parts = [(everything, everything)]
         if self.objective == "k-fold":
             parts = time_blocks(len(y), min(self.folds, len(y)))
-        return ErrorOfC(
-            X,
-            y,
-            self.scale,
-            self.fit_intercept,
-            weights,
-            parts,
-        )
+        return ErrorOfC(X, y, self.scale, self.fit_intercept, parts)

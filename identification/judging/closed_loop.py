@@ -105,7 +105,11 @@ def _sail(
     commands = np.tile(model.service_command, (n_steps, 1))
     commands[:, 0] = leg.order
     if leg.order is None:
-        commands[:, 0] = np.interp(t[:-1], trial.t, rudder(trial))
+        commands[:, 0] = np.interp(
+            t[:-1],
+            trial.t,
+            rudder(trial),
+        )
     if "n" in model.command_names and "n" in trial:
         commands[:, 1] = np.interp(t[:-1], trial.t, trial["n"])
     states = passage.states(state, n_steps)

@@ -10,7 +10,7 @@ from identification.arrays import by_name, column_rms, mean_square, root_mean_sq
 from identification.estimators.covariance import residuals
 from identification.estimators.estimator import Estimator, Estimators
 from identification.samples.samples import Samples
-from shipgym.arrays import Floats, Integers
+from shipgym.arrays import Floats
 from shipgym.ships import Structure
 
 COLLINEAR = 0.98  # correlation of two features
@@ -96,21 +96,6 @@ def scaled_features(features: Floats) -> tuple[Floats, float]:
     return scaled, float(singular[0] / max(singular[-1], rounding))
 
 
-def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
-    """Autocorrelation of a series at lags of 1, 2, ... samples.
-
-    Fewer lags for a short series, none for a constant one.
-    """
-    centred = values - values.mean()
-    power = float(centred @ centred)
-    if power == 0.0:
-        return ()
-    most = min(lags, len(values) - 1)
-    return tuple(
-        float(centred[lag:] @ centred[:-lag]) / power for lag in range(1, most + 1)
-    )
-
-
 def correlation_matrix(scaled: Floats) -> Floats:
     """Correlation about zero of features of a root mean square of 1.
 
@@ -128,13 +113,6 @@ def variance_inflation(scaled: Floats) -> Floats:
     moment = correlation_matrix(scaled)
     regular = moment + JITTER * np.eye(len(moment))
     return np.diag(np.linalg.inv(regular)) * np.diag(moment)
-
-
-def without_overlap(samples: Samples) -> Integers:
-    """Rows whose windows do not overlap."""
-    between = max(samples.window // 2, 1)  # steps from one row to the next
-    every = int(np.ceil(samples.window / between))
-    return np.arange(0, len(samples), every)
 
 
 def collinear_pairs(

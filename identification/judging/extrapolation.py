@@ -22,7 +22,7 @@ from identification.arrays import column_rms, root_mean_square
 from identification.samples.folds import largest_rudders
 from identification.samples.prediction import predict
 from shipgym import InputError, ManoeuvreError, ShipModel, Trial, UnstableModelError
-from shipgym.arrays import Floats, Integers
+from shipgym.arrays import Floats, Integers, integral
 from shipgym.manoeuvres import turning_circle
 from shipgym.ships.structures import MMG
 
@@ -44,16 +44,9 @@ def holds_turn(trials: Sequence[Trial]) -> bool:
 
 def _turned(trial: Trial) -> float:
     """Largest change of heading from the start of a trial, rad."""
-    if "psi" in trial:
-        heading = np.unwrap(trial["psi"])
-    else:
-        steps = np.diff(
-            trial.t,
-            prepend=trial.t[0],
-        )
-        heading = np.cumsum(trial["r"] * steps)
-    change = heading - heading[0]
-    return float(np.abs(change).max())
+    known = "psi" in trial
+    heading = np.unwrap(trial["psi"]) if known else integral(trial.t, trial["r"])
+    return float(np.abs(heading - heading[0]).max())
 
 
 def hardest(trials: Sequence[Trial]) -> Integers:

@@ -15,9 +15,9 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import t as student
 
-from identification.arrays import mean_square, root_mean_square
+from identification.arrays import mean_square, root_mean_square, rounded
 from identification.judging.closed_loop import closed_loop
-from identification.judging.prediction import ZIGZAG, index_reader
+from identification.judging.prediction import ZIGZAG, indices_of
 from identification.samples.prediction import (
     COMPARED,
     predict,
@@ -84,7 +84,10 @@ def _generalisation(
     over that of the normal distribution. `DEFAULT` where fewer than three can be
     predicted.
     """
-    sizes, predicted = error_sizes(left_out, trials[: len(left_out)])
+    sizes, predicted = error_sizes(
+        left_out,
+        trials[: len(left_out)],
+    )
     if predicted < FEWEST_TRIALS:
         how = f"assumed: {predicted} of {len(trials)} trials predicted when left out"
         return {"factor": DEFAULT, "how": how}
@@ -250,13 +253,13 @@ def index_errors(
     clean: Trial,
 ) -> list[PredictionError]:
     """Error of each index of a zigzag or a turning circle that the model predicts."""
-    read = index_reader(own, clean)
-    if read is None:
+    measured = indices_of(own, clean, clean)
+    if measured is None:
         return []
     sail = closed_loop if trial.kind == "zigzag" else predict
-    measured = read(clean)
-    predicted = read(sail(own, clean))
-    draws = [read(sail(draw, clean)) for draw in drawn]
+    predicted, *draws = [
+        indices_of(own, clean, sail(model, clean)) for model in (own, *drawn)
+    ]
 
     names = list(ZIGZAG)
     if predicts_track(own):
@@ -316,8 +319,5 @@ def with_sound_draws(model: ShipModel, trials: Sequence[Trial]) -> ShipModel:
     drawn = [draw for draw in whole if sails(draw)]
     if not 0.5 * len(whole) <= len(drawn) < len(whole):
         return model
-    draws = [
-        [float(f"{value:.8g}") for value in draw.coefficients.values()]
-        for draw in drawn
-    ]
-    return replace(model, draws=np.array(draws))
+    draws = np.array([[*draw.coefficients.values()] for draw in drawn])
+    return replace(model, draws=rounded(draws))

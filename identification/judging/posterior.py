@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from identification.arrays import rounded
 from identification.judging.coarsened import CoarsenedPosterior
 from identification.judging.model_error import FEWEST_TRIALS, model_error
 from identification.judging.sampling import (
@@ -21,29 +22,6 @@ from identification.models.segments import Segment, compared_channels, cut
 from identification.samples.prediction import with_start
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
-from shipgym.manoeuvres.execution import usual_rudder
-
-
-def check_trials(trials: Sequence[Trial]) -> None:
-    """Refuse trials too few or too alike to tell how much their likelihood counts."""
-    kinds = {
-        (trial.kind, round(float(np.degrees(usual_rudder(trial)))), _first_side(trial))
-        for trial in trials
-    }
-    if len(trials) < FEWEST_TRIALS or len(kinds) == 1:
-        raise InputError(
-            f"uncertainty: expected at least {FEWEST_TRIALS} trials to fit for a"
-            " posterior, which differ in kind, rudder angle or side, so that one left"
-            f" out tells something, got {len(trials)}{' alike' * (len(kinds) == 1)};"
-            " add trials, or choose 'analytic'"
-        )
-
-
-def _first_side(trial: Trial) -> float:
-    """Sign of the first rudder angle that is half the usual one."""
-    delta = trial["delta"]
-    large = np.abs(delta) >= 0.5 * usual_rudder(trial)
-    return float(np.sign(delta[large.argmax()]))
 
 
 def table_prior(model: ShipModel) -> CoefficientPrior:
@@ -78,9 +56,14 @@ def with_posterior(
     """The model with draws of its posterior, and a report for the provenance.
 
     `model`, with the covariance that it keeps where the walkers do not mix, was
-    identified from `trials`. Raises InputError for trials too few or too alike.
+    identified from `trials`. Raises InputError for too few trials.
     """
-    check_trials(trials)
+    if len(trials) < FEWEST_TRIALS:
+        raise InputError(
+            f"uncertainty: expected at least {FEWEST_TRIALS} trials to fit for a"
+            f" posterior, so that one left out tells something, got {len(trials)}; add"
+            " trials, or choose 'analytic'"
+        )
     bare = replace(model, covariance=None, draws=None)
     channels = compared_channels(bare, trials)
     step = 0.2  # ship lengths, from sample to sample and of the integration
@@ -114,7 +97,7 @@ def with_posterior(
         "prior": prior.source,
         "power": posterior.power,
         "left_out": error,
-        **mixing.plain(),
+        **mixing._asdict(),
         "remarks": remarks,
     }
 
@@ -202,7 +185,7 @@ def _with_draws(model: ShipModel, prior: CoefficientPrior, points: Floats) -> Sh
     return replace(
         model,
         covariance=prior.covariance(of_points),
-        draws=_rounded(prior.coefficients(points[chosen])),
+        draws=rounded(prior.coefficients(points[chosen])),
     )
 
 
@@ -255,13 +238,8 @@ def contradictions(whole: Sailed, point: Floats) -> list[str]:
 def _not_mixed(mixing: Mixing) -> str:
     """A remark on walkers that did not mix."""
     return (
-        f"posterior: the walkers did not mix in {mixing.steps} steps (autocorrelation"
-        f" time {mixing.autocorrelation_time:.0f}, split R-hat {mixing.r_hat:.2f}); the"
-        f" covariance is kept: try uncertainty.steps = {4 * mixing.steps}"
+        f"posterior: the walkers did not mix in {mixing.steps} steps"
+        f" ({mixing.effective_samples:.0f} effective samples, drift"
+        f" {mixing.drift:.2f}); the covariance is kept: try uncertainty.steps ="
+        f" {4 * mixing.steps}"
     )
-
-
-def _rounded(values: Floats) -> Floats:
-    """Values to eight significant digits, for a small file."""
-    written = [float(f"{value:.8g}") for value in values.ravel()]
-    return np.array(written).reshape(values.shape)

@@ -1,7 +1,5 @@
 """Errors of predicted trials, and indices of their manoeuvres."""
 
-from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 from identification.arrays import root_mean_square
@@ -11,9 +9,6 @@ from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import switch_heading_deg, turning_indices, zigzag_indices
 
 ZIGZAG = ("overshoot_1_deg", "overshoot_2_deg")
-
-#: From a run of a trial's manoeuvre, or None for one that ran away, to its indices.
-IndexReader = Callable[[Trial | None], Any]
 
 
 def trial_metrics(
@@ -33,19 +28,20 @@ def trial_metrics(
         "rmse": _errors(model, trial, prediction),
         **dict.fromkeys((*ZIGZAG, *turning)),
     }
-    read = index_reader(model, trial)
-    if read is None:
-        return metrics
-    measured = read(trial)
+    measured = indices_of(
+        model,
+        trial,
+        trial,
+    )
     if measured is None:
         return metrics
 
-    runs = {"measured": measured, "predicted": read(prediction)}
+    runs = {"measured": measured, "predicted": indices_of(model, trial, prediction)}
     names: tuple[str, ...] = turning
     if trial.kind == "zigzag":
         names = ZIGZAG
         again = None if prediction is None else closed_loop(model, trial)
-        runs["closed_loop"] = read(again)
+        runs["closed_loop"] = indices_of(model, trial, again)
     for name in names:
         metrics[name] = {
             kind: getattr(indices, name, None) for kind, indices in runs.items()
@@ -67,30 +63,20 @@ def _errors(
     return errors
 
 
-def index_reader(model: ShipModel, trial: Trial) -> IndexReader | None:
-    """From a run of the trial's manoeuvre to its indices; None for other manoeuvres.
+def indices_of(model: ShipModel, trial: Trial, run: Trial | None) -> Any:
+    """Indices of a run of a trial's manoeuvre.
 
-    The reader gives None for a run without a channel that it needs, such as the
-    position.
+    None for a run that ran away or lacks a channel, such as the position, and for
+    manoeuvres that have none.
     """
     length = model.particulars["length"]
-    indices: Callable[[Trial], Any]
-    if trial.kind == "turning-circle":
-        indices = partial(turning_indices, length=length)
-    elif trial.kind == "zigzag":
-        heading = switch_heading_deg(trial)
-        if heading is None:
-            return None
-        indices = partial(zigzag_indices, length=length, heading_deg=heading)
-    else:
-        return None
-
-    def read(run: Trial | None) -> Any:
-        if run is None:
-            return None
-        try:
-            return indices(run)
-        except InputError:
-            return None
-
-    return read
+    try:
+        if run is not None and trial.kind == "turning-circle":
+            return turning_indices(run, length=length)
+        if run is not None and trial.kind == "zigzag":
+            heading = switch_heading_deg(trial)
+            if heading is not None:
+                return zigzag_indices(run, length=length, heading_deg=heading)
+    except InputError:
+        pass
+    return None

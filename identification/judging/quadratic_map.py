@@ -53,17 +53,7 @@ def quadratic_map(
 
     def steps(coordinates: Floats) -> Floats:
         """Gauss-Newton steps of each coordinate, shape (n_points, n_parameters)."""
-        found = []
-        at_once = 512
-        n_points = len(coordinates)
-        for begin in range(0, n_points, at_once):
-            end = begin + at_once
-            part = coordinates[begin:end]
-            points = mode + part @ axes.T
-            reached = errors(points)
-            step = -reached.T @ along
-            found.append(step)
-        return np.concatenate(found)
+        return np.asarray(-errors(mode + coordinates @ axes.T).T @ along)
 
     n_parameters = len(mode)
     first, second = np.triu_indices(n_parameters)
@@ -72,13 +62,7 @@ def quadratic_map(
     later = second[:, None] >= np.arange(n_parameters)
     bends[later] = 0.0
     counts = np.abs(bends).max(axis=1) > 1e-3
-    return QuadraticMap(
-        mode=mode,
-        axes=axes,
-        first=first[counts],
-        second=second[counts],
-        bends=bends[counts],
-    )
+    return QuadraticMap(mode, axes, first[counts], second[counts], bends[counts])
 
 
 def _second_differences(
@@ -98,8 +82,4 @@ def _second_differences(
         bends = 0.5 * (both - single[first] - single[second])
     squared = first == second
     bends[squared] = 0.5 * single
-    return np.nan_to_num(
-        bends,
-        posinf=0.0,
-        neginf=0.0,
-    )
+    return np.nan_to_num(bends, posinf=0.0, neginf=0.0)

@@ -71,7 +71,10 @@ def with_bias(model: ShipModel, problem: Problem) -> Structure | None:
     table = model.dynamics
     if type(table) is not Structure or has_constant(table):
         return None
-    bias = rudder_bias(model, problem)
+    bias = rudder_bias(
+        model,
+        problem,
+    )
     if bias is None or not bias.significant:
         return None
     return with_constant(table)

@@ -1,8 +1,7 @@
 """Points of a probability density by the walkers of emcee, and how they mixed."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from typing import Any, NamedTuple
 
 import emcee
 import numpy as np
@@ -15,28 +14,19 @@ from shipgym.arrays import Floats
 LogDensity = Callable[[Floats], Floats]
 
 
-@dataclass(frozen=True)
-class Mixing:
-    """Diagnostics of chains, each of the parameter that mixed worst."""
-
-    largest_r_hat: ClassVar[float] = 1.2  # of chains that mixed
-    #: autocorrelation times that chains that mixed last
-    fewest_times: ClassVar[float] = 5.0
+class Mixing(NamedTuple):
+    """Diagnostics of walkers, each of the parameter that mixed worst."""
 
     steps: int  # after the warm-up
-    autocorrelation_time: float  # integrated, steps
-    r_hat: float  # split R-hat
+    #: by the scatter of the walkers' means, which is that of the points for walkers
+    #: that never moved
     effective_samples: float
+    drift: float  # of the mean from the first half to the second, standard deviations
 
     @property
     def is_enough(self) -> bool:
-        """Whether the chains can stand for the density."""
-        lasts = self.steps >= self.fewest_times * self.autocorrelation_time
-        return bool(lasts and self.r_hat <= self.largest_r_hat)
-
-    def plain(self) -> dict[str, Any]:
-        """The diagnostics for the provenance."""
-        return asdict(self)
+        """Whether the points can stand for the density."""
+        return self.effective_samples > 150.0 and self.drift < 0.5
 
 
 def sample(log_density: LogDensity, start: Floats, steps: int) -> Floats:
@@ -94,34 +84,14 @@ def autoregression(points: Floats) -> Any:
 
 
 def mixing_of(points: Floats) -> Mixing:
-    """Diagnostics of chains of at least four steps, as `sample` gives them."""
-    steps, walkers, _ = points.shape
-    with np.errstate(invalid="ignore"):  # of walkers that never moved
-        times = emcee.autocorr.integrated_time(points, tol=0, quiet=True)
-    time = float(np.nan_to_num(times, nan=steps).max())
+    """Diagnostics of points, shape (n_steps, n_walkers, n_parameters)."""
+    n_steps, n_walkers, _ = points.shape
+    variance = np.maximum(points.var(axis=(0, 1)), np.finfo(float).tiny)
+    of_means = points.mean(axis=0).var(axis=0, ddof=1)
+    half = n_steps // 2
+    drift = points[half:].mean(axis=(0, 1)) - points[:half].mean(axis=(0, 1))
     return Mixing(
-        steps=steps,
-        autocorrelation_time=max(time, 1.0),
-        r_hat=float(split_r_hat(points).max()),
-        effective_samples=steps * walkers / max(time, 1.0),
+        steps=n_steps,
+        effective_samples=n_walkers * float((variance / of_means).min()),
+        drift=float((np.abs(drift) / np.sqrt(variance)).max()),
     )
-
-
-def split_r_hat(points: Floats) -> Floats:
-    """R-hat of each parameter, the chain of each walker split in two.
-
-    Gelman et al. 2013, Bayesian Data Analysis, 11.4. Points have shape (n_steps,
-    n_walkers, n_parameters).
-    """
-    half = len(points) // 2
-    chains = np.concatenate(
-        [points[:half], points[half : 2 * half]],
-        axis=1,
-    )
-    within = chains.var(
-        axis=0,
-        ddof=1,
-    ).mean(axis=0)
-    between = chains.mean(axis=0).var(axis=0, ddof=1)
-    ratio = between / np.maximum(within, np.finfo(float).tiny)
-    return np.asarray(np.sqrt((half - 1.0) / half + ratio))

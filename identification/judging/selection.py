@@ -9,7 +9,7 @@ over the time to sail one ship length.
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -28,29 +28,6 @@ RESPONSES = ("nomoto", "norrbin", "nomoto-bias", "norrbin-bias")
 PIECE = 5.0
 
 
-class Fitted(Protocol):
-    """A structure fitted to trials."""
-
-    @property
-    def problem(self) -> Any:
-        """The problem that it was fitted to."""
-
-    @property
-    def model(self) -> ShipModel:
-        """The model of all trials."""
-
-    @property
-    def free_coefficients(self) -> int:
-        """Number of coefficients that the trials determine."""
-
-    @property
-    def stable(self) -> bool:
-        """Whether it passed the guard."""
-
-    def without(self, trials: Sequence[int]) -> ShipModel:
-        """The model of the other trials, by their places."""
-
-
 @dataclass(frozen=True)
 class RankedFit:
     """How well a structure and a method predict what was left out."""
@@ -65,9 +42,7 @@ class RankedFit:
     loss: float
     #: root mean square error, mean over the trials on which it did not run away
     heading_deg: float | None
-    yaw_rate_deg_s: float | None
     scales: dict[str, float]  # errors by the noise, median of the pieces, by channel
-    losses: dict[str, float]  # mean of each trial
     of_pieces: tuple[float, ...] = field(repr=False)  # losses
 
     @property
@@ -87,56 +62,44 @@ def fit_name(structure: str, method: str) -> str:
     return f"{structure} by {method}"
 
 
-def rank_by_likelihood(structure: str, method: str, fit: Fitted) -> RankedFit:
-    """Rank of a fit, by what it predicts of its own trials, each left out in turn."""
+def rank_by_likelihood(structure: str, method: str, fit: Any) -> RankedFit:
+    """Rank of a fit, by what it predicts of its own trials, each left out in turn.
+
+    It is one of the pipeline: of regression or of simulation.
+    """
     trials = fit.problem.used
     groups = [np.array([place]) for place in range(len(trials))]
     largest = hardest(trials)  # what a hard turn is to trials of less rudder
     if largest.size:
         groups.append(largest)
-    runs = list[tuple[Trial, Trial | None]]()
+    windy = any("wind_rdot" in trial for trial in trials)
+    of_pieces: list[float] = []
+    sizes: dict[str, list[float]] = {}
+    headings = []
+    ran_away = 0
     for group in groups:
         model = fit.without(group.tolist())
-        runs += [(trials[place], predict(model, trials[place])) for place in group]
-
-    windy = in_wind(trials)
-    losses: dict[str, list[float]] = {trial.name: [] for trial in trials}
-    sizes: dict[str, list[float]] = {}
-    for trial, run in runs:
-        found = piece_errors(fit.model, trial, run, windy)
-        losses[trial.name] += np.mean(np.log([*found.values()]), axis=0).tolist()
-        for name, own in found.items():
-            sizes.setdefault(name, []).extend(own)
-    of_pieces = [loss for found in losses.values() for loss in found]
-    known = [(trial, run) for trial, run in runs if run is not None]
+        for trial in [trials[place] for place in group]:
+            run = predict(model, trial)
+            found = piece_errors(fit.model, trial, run, windy)
+            of_pieces += np.mean(np.log([*found.values()]), axis=0).tolist()
+            for name, own in found.items():
+                sizes.setdefault(name, []).extend(own)
+            if run is None:
+                ran_away += 1
+            elif "psi" in trial:
+                headings.append(root_mean_square(run["psi"] - trial["psi"]))
     return RankedFit(
         structure=structure,
         method=method,
         coefficients=fit.free_coefficients,
         stable=fit.stable,
-        ran_away=len(runs) - len(known),
+        ran_away=ran_away,
         loss=float(np.mean(of_pieces)),
-        heading_deg=_mean_error_deg("psi", known),
-        yaw_rate_deg_s=_mean_error_deg("r", known),
+        heading_deg=float(np.degrees(np.mean(headings))) if headings else None,
         scales={name: float(np.median(own)) for name, own in sizes.items()},
-        losses={name: float(np.mean(found)) for name, found in losses.items()},
         of_pieces=tuple(of_pieces),
     )
-
-
-def _mean_error_deg(name: str, runs: Sequence[tuple[Trial, Trial]]) -> float | None:
-    """Error of a channel in deg, mean over the trials that have it."""
-    errors = [
-        root_mean_square(run[name] - trial[name])
-        for trial, run in runs
-        if name in trial
-    ]
-    return float(np.degrees(np.mean(errors))) if errors else None
-
-
-def in_wind(trials: Sequence[Trial]) -> bool:
-    """Return True where wind was logged and its force is known."""
-    return any("wind_rdot" in trial for trial in trials)
 
 
 def piece_errors(
@@ -193,7 +156,10 @@ def _differs_by_chance(fit: RankedFit, first: RankedFit) -> bool:
     """Tell whether a loss exceeds the first's by no more than chance."""
     if fit.stable != first.stable:
         return False
-    differences = np.subtract(fit.of_pieces, first.of_pieces)
+    differences = np.subtract(
+        fit.of_pieces,
+        first.of_pieces,
+    )
     by_chance = float(np.std(differences)) / np.sqrt(max(len(differences) - 1, 1))
     nothing = 0.02
     return bool(np.mean(differences) <= max(by_chance, nothing))

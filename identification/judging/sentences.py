@@ -23,8 +23,8 @@ def error_source(provenance: Mapping[str, Any]) -> str:
     if posterior and posterior["kept"]:
         return (
             "a posterior by sampling (likelihood to the power"
-            f" {posterior['power']:.2g}, split R-hat {posterior['r_hat']:.3f},"
-            f" {posterior['effective_samples']:.0f} effective samples)"
+            f" {posterior['power']:.2g}, {posterior['effective_samples']:.0f} effective"
+            " samples)"
         )
     source = "the residuals of the fit, correlated in time and between the equations"
     error = provenance.get("model_error")

@@ -167,7 +167,10 @@ def held_out_error(fit: Fit) -> str:
     for name, metrics in fit.metrics["trials"].items():
         if metrics["use"] == "validate" and metrics["diverged"]:
             return f"On {PurePath(name).name}, held out, the model runs away."
-    errors = heading_errors_deg(fit, "validate")
+    errors = heading_errors_deg(
+        fit,
+        "validate",
+    )
     if not errors:
         return "No trial with a heading was held out."
     worst = max(errors, key=lambda name: errors[name])

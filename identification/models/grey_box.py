@@ -4,11 +4,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from identification.models.similarity import (
-    AUTO,
-    check_alike,
-    select_reference,
-)
+from identification.models.similarity import select_reference
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.models import grey_box
 from shipgym.ships import GreyBox
@@ -38,16 +34,18 @@ def chosen_box(
         recorded = set.intersection(*(set(trial.channels) for trial in trials))
 
     similarity: dict[str, float] = {}
-    if reference in (None, AUTO):
+    if reference in (None, "auto"):
         with suppress(InputError):  # too little may be known to estimate the rest
             particulars = particulars.completed()
         reference, similarity = select_reference(particulars, recorded)
-        otherwise = 'choose structure "abkowitz" or "cubic"'
-        check_alike(
-            reference,
-            similarity[reference],
-            otherwise,
-        )
+        least, found = 0.5, similarity[reference]
+        if found < least:
+            raise InputError(
+                "reference_model: 'auto' expected a ship like this one, with a"
+                f" similarity of at least {least:g}, got {reference!r} with {found:.2f}"
+                ' as the best; choose structure "abkowitz" or "cubic", or name the ship'
+                f" all the same: reference_model = {reference!r}"
+            )
     box = grey_box(reference)
     has_shaft = box.shaft and "n" in recorded
     return replace(box, shaft=has_shaft), similarity

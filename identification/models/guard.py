@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from identification.estimators.estimator import Estimators, FitTask
+from identification.estimators.estimator import Estimators
 from identification.models.hard_turn import RUDDER_DEG, hard_turn_features
 from identification.models.methods import Method, fit_held
+from identification.samples.problem import Problem
 from shipgym import ShipModel, Trial, UnstableModelError
+from shipgym.arrays import Floats
 from shipgym.manoeuvres import turning_circle
 from shipgym.manoeuvres.registry import FASTEST, QUICKEST_TURN
 from shipgym.models.simulate import open_loop
@@ -100,13 +102,12 @@ def reversed_rudder(model: ShipModel, rudder_deg: float, lengths: float) -> Tria
     steps = np.arange(round(DURATION_LENGTHS / STEP))
     to_port = steps // round(lengths / STEP) % 2 == 1
     commands = np.tile(model.service_command, (len(steps), 1))
-    commands[:, 0] = np.radians(
-        np.where(
-            to_port,
-            -rudder_deg,
-            rudder_deg,
-        )
+    angles = np.where(
+        to_port,
+        -rudder_deg,
+        rudder_deg,
     )
+    commands[:, 0] = np.radians(angles)
     return model.simulate(commands, STEP * model.travel_time)
 
 
@@ -144,6 +145,14 @@ class GuardedFit:
     #: for the provenance: `decision`, `strength` of the penalty, the method that it
     #: came `in_place_of`, and why the fit without it was rejected
     report: dict[str, Any]
+    #: of one that was refined: for the provenance settings, cost and decision
+    refinement: dict[str, Any] | None = None
+    #: of the coefficients of the accelerations, shape (n_coefficients,
+    #: n_coefficients); None where that follows from the regression
+    covariance: Floats | None = None
+    #: by trial: by how much stretches of time moved those coefficients, shape
+    #: (n_stretches, n_coefficients)
+    influences: Sequence[Floats] = ()
 
     @property
     def held_by(self) -> str | None:
@@ -151,39 +160,35 @@ class GuardedFit:
         return HELD if "in_place_of" in self.report else None
 
 
-def guarded_fit(method: Method, task: FitTask, guarded: bool = True) -> GuardedFit:
+def guarded_fit(method: Method, problem: Problem, guarded: bool = True) -> GuardedFit:
     """Fit by a method; if the model runs away, with a penalty.
 
     The penalty is the weakest under which the model does not run away. Not stable, and
     without a penalty, where none helped or it is not `guarded`.
     """
-    estimators = method.fitted(task)
-    model = with_coefficients(task.blank, estimators)
-    reasons = reasons_unstable(model, task.trials)
+    estimators = method.fitted(problem)
+    model = with_coefficients(problem.blank, estimators)
+    reasons = reasons_unstable(model, problem.used)
     if not reasons:
-        return GuardedFit(
-            model=model,
-            estimators=estimators,
-            stable=True,
-            report={"decision": "stable as fitted"},
-        )
+        return GuardedFit(model, estimators, True, {"decision": "stable as fitted"})
 
     decision = "runs away, not guarded"
     if guarded and method.regularised:
-        penalised = penalised_fit(method.name, estimators, task, reasons)
+        penalised = penalised_fit(method.name, estimators, problem, reasons)
         if penalised is not None:
             return penalised
         decision = "runs away under every penalty"
+    report = {"decision": decision, "rejected": reasons}
     return GuardedFit(
-        model=model,
-        estimators=estimators,
-        stable=False,
-        report={"decision": decision, "rejected": reasons},
+        model,
+        estimators,
+        False,
+        report,
     )
 
 
 def penalised_fit(
-    name: str, fitted: Estimators, task: FitTask, reasons: list[str]
+    name: str, fitted: Estimators, problem: Problem, reasons: list[str]
 ) -> GuardedFit | None:
     """The fit with the weakest penalty on hard turns under which it does not run away.
 
@@ -191,16 +196,16 @@ def penalised_fit(
     penalty; `reasons`: why these run away. Strengths are rms errors allowed in the
     regression, relative to what the terms contribute in a hard turn.
     """
-    blank = task.blank
+    blank = problem.blank
     sizes = hard_turn_features(
         blank.table,
         blank.particulars,
         blank.service_shaft_speed,
     )
     for strength in np.geomspace(1e-3, 1.0, 19).tolist():
-        estimators = fit_held(fitted, task.samples, sizes, strength)
+        estimators = fit_held(fitted, problem.samples, sizes, strength)
         model = with_coefficients(blank, estimators)
-        if not reasons_unstable(model, task.trials):
+        if not reasons_unstable(model, problem.used):
             report = {
                 "decision": "penalised by hard turn",
                 "strength": strength,

@@ -6,7 +6,6 @@ k-means in mirrored pairs, and the ridge regression solved in the primal, in the
 principal components of the data in feature space.
 """
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import Any, NamedTuple
@@ -21,10 +20,12 @@ from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.rm_svm import heading_error, most_regularised
 from identification.samples.folds import held_out_rows
+from identification.samples.preprocess import smoothed_channels
+from identification.samples.problem import Problem
 from identification.samples.samples import Samples
-from shipgym import InputError, ShipModel, Trial
+from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats, finite
-from shipgym.ships import GreyBox, Structure
+from shipgym.ships import GreyBox
 from shipgym.ships.kernel_boxes import Kernel, gaussians, kernel_box, kernel_inputs
 
 MIRROR = np.array([-1.0, -1.0, -1.0, 1.0])  # of the inputs, port to starboard
@@ -64,19 +65,12 @@ class _Stage(NamedTuple):
             {q: estimator.coef_ for q, estimator in estimators.items()}
         )
 
-    def fit(self, weight: float, report: dict[str, Any]) -> KernelFit:
-        """The fit to all rows."""
-        estimators = self.fitted(weight)
-        return KernelFit(self.model(estimators), self.samples, estimators, report)
-
 
 def fit_kernel(
     asked: KernelResidual,
     blank: ShipModel,
-    trials: Sequence[Trial],
+    problem: Problem,
     box: GreyBox,
-    channels: Sequence[dict[str, Floats]],
-    build_rows: Callable[[Structure], Samples],
 ) -> KernelFit:
     """Fit a kernel to what the reference ship of a grey box leaves.
 
@@ -90,26 +84,19 @@ def fit_kernel(
         Settings.
     blank : ShipModel
         The ship; its structure is not used.
-    trials : sequence of Trial
-        To fit.
+    problem : Problem
+        The trials to fit, and how they become a regression.
     box : GreyBox
         Its reference ship is beneath the kernel.
-    channels : sequence of dict
-        `INPUT_CHANNELS` of each trial, smoothed.
-    build_rows : callable
-        The regression of the trials with a structure.
     """
+    trials, smoothing = problem.used, problem.sampling["smoothing"]
+    channels = [smoothed_channels(one, INPUT_CHANNELS, smoothing) for one in trials]
     inputs = np.concatenate([kernel_inputs(one, blank.particulars) for one in channels])
     # lengths in root mean squares of the inputs, the smoothest first
     lengths = (2.8, 2.0, 1.4, 1.0, 0.7) if asked.length is None else (asked.length,)
     weights = np.geomspace(0.1, 1e4, 6) if asked.C is None else (asked.C,)
     stages = {
-        length: _stage(
-            blank,
-            box,
-            _kernel(inputs, asked.centres, length),
-            build_rows,
-        )
+        length: _stage(blank, box, _kernel(inputs, asked.centres, length), problem)
         for length in lengths
     }
 
@@ -131,16 +118,25 @@ def fit_kernel(
     errors["reference"] = error(0.0, length)
 
     chosen = stages[length]
-    report = {"kind": asked.kernel, "length": length, "C": weight}
-    return chosen.fit(weight, report | _told(chosen.kernel, errors))
+    report = {
+        "kind": asked.kernel,
+        "length": length,
+        "C": weight,
+        "centres": len(chosen.kernel.centres),
+        "features": chosen.kernel.basis.shape[1],
+        "remarks": _remarks(errors),
+        "heading_errors_held_out": {name: finite(one) for name, one in errors.items()},
+    }
+    estimators = chosen.fitted(weight)
+    return KernelFit(
+        chosen.model(estimators),
+        chosen.samples,
+        estimators,
+        report,
+    )
 
 
-def _stage(
-    blank: ShipModel,
-    box: GreyBox,
-    kernel: Kernel,
-    build_rows: Callable[[Structure], Samples],
-) -> _Stage:
+def _stage(blank: ShipModel, box: GreyBox, kernel: Kernel, problem: Problem) -> _Stage:
     """A kernel on a reference ship, with the regression of its coefficients."""
     table = kernel_box(box, kernel)
     ship = replace(
@@ -152,17 +148,7 @@ def _stage(
         provenance=None,
         coefficients=dict.fromkeys(table.coefficient_names, 0.0),
     )
-    return _Stage(kernel, ship, build_rows(table))
-
-
-def _told(kernel: Kernel, errors: dict[str, float]) -> dict[str, Any]:
-    """What the provenance says of a kernel and of errors on held-out trials."""
-    return {
-        "centres": len(kernel.centres),
-        "features": kernel.basis.shape[1],
-        "remarks": _remarks(errors),
-        "heading_errors_held_out": {name: finite(one) for name, one in errors.items()},
-    }
+    return _Stage(kernel, ship, problem.rows_of(table, ship))
 
 
 def _remarks(errors: dict[str, float]) -> list[str]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import by_name
-from identification.models.least_squares import Linearised
+from identification.least_squares import Linearised
 from identification.models.mmg_prior import MMGPrior, mmg_prior
 from identification.models.prior_knowledge import PriorKnowledge
 from identification.models.sailed import (
@@ -23,7 +23,6 @@ from identification.models.sailed import (
 from identification.models.segments import compared_channels, cut
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Flags, Floats, Integers
-from shipgym.ships.hull_formulas import YOSHIMURA
 from shipgym.ships.mmg import IDENTIFIED
 
 
@@ -76,7 +75,13 @@ class MMGFit:
         expect, one on average; at least 1.
         """
         groups = held_out_groups(self.segments.of_trials)
-        found = [self._errors_of(groups == group, scales) for group in set(groups)]
+        found = [
+            self._errors_of(
+                groups == group,
+                scales,
+            )
+            for group in set(groups)
+        ]
         mean_squares, excess, expected = np.array(found).T
         return replace(
             self,
@@ -132,7 +137,7 @@ def fit_mmg(blank: ShipModel, trials: Sequence[Trial], asked: PriorKnowledge) ->
     strongest of 1, 2, 3 whose error, each trial predicted from the others, is within a
     tenth of the least. The report is for the provenance.
     """
-    prior = mmg_prior(asked.source or YOSHIMURA, blank.particulars)
+    prior = mmg_prior(asked.source, blank.particulars)
     ship = replace(
         blank,
         particulars=prior.ship,
@@ -216,8 +221,6 @@ def _report(fits: Sequence[MMGFit], best: MMGFit) -> dict[str, Any]:
 
 def _prior_report(prior: MMGPrior) -> dict[str, Any]:
     report: dict[str, Any] = {"prior": prior.source}
-    if prior.similarity:
-        report["similarity"] = dict(prior.similarity)
     if prior.remarks:
         report["prior_remarks"] = list(prior.remarks)
     return report

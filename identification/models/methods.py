@@ -12,11 +12,12 @@ from sklearn.base import clone
 from identification.arrays import column_rms
 from identification.estimators.adapted import Adapted
 from identification.estimators.decomposition import scales_of
-from identification.estimators.estimator import Estimator, Estimators, FitTask
+from identification.estimators.estimator import Estimator, Estimators
 from identification.estimators.linear import LinearRegressor
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.tuned import TunedLSSVM
 from identification.models.refinement import Refinement
+from identification.samples.problem import Problem
 from identification.samples.samples import Samples
 from shipgym import InputError
 from shipgym.arrays import Floats
@@ -55,17 +56,11 @@ def fit_all(make: Callable[[], Estimator], samples: Samples) -> Estimators:
     estimators: Estimators = {}
     for q, X, y in samples.by_equation():
         estimator = make()
-        estimators[q] = estimator.fit(X, y)
+        estimators[q] = estimator.fit(
+            X,
+            y,
+        )
     return estimators
-
-
-def fit_equations(make: Callable[[], Estimator], task: FitTask) -> Estimators:
-    """Fit an estimator to each equation, or all together where the estimator can."""
-    estimator: Any = make()
-    if hasattr(estimator, "fit_equations"):
-        together: Estimators = estimator.fit_equations(task)
-        return together
-    return fit_all(make, task.samples)
 
 
 @dataclass(frozen=True)
@@ -79,9 +74,13 @@ class Method:
     #: what the fit is the start of
     refinement: Refinement | None = None
 
-    def fitted(self, task: FitTask) -> Estimators:
-        """Estimators of all equations, fitted."""
-        return fit_equations(self.make, task)
+    def fitted(self, problem: Problem) -> Estimators:
+        """Estimators of all equations, fitted together where the estimator can."""
+        estimator: Any = self.make()
+        if hasattr(estimator, "fit_equations"):
+            together: Estimators = estimator.fit_equations(problem)
+            return together
+        return fit_all(self.make, problem.samples)
 
 
 def get_method(method: str | Any) -> Method:

@@ -4,24 +4,12 @@ Those of a reference ship, or from main dimensions.
 """
 
 import math
-from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
-from identification.models.similarity import (
-    AUTO,
-    LEAST_SIMILARITY,
-    check_alike,
-    correlations,
-    select_reference,
-    similarity_vector,
-)
 from shipgym import InputError, Particulars, ShipModel, load_model
 from shipgym.arrays import Floats
-from shipgym.checks import quoted
-from shipgym.models.catalogue import REFERENCE_SHIPS
 from shipgym.ships.hull_formulas import (
     YOSHIMURA,
     completed,
@@ -89,95 +77,39 @@ class MMGPrior:
     ship: Particulars  # with what the MMG form needs, estimated where absent
     mean: dict[str, float]  # of all coefficients, those known beforehand too
     deviation: Floats  # of `IDENTIFIED`, shape (41,)
-    remarks: tuple[str, ...] = ()  # what a user has to know of it
-    #: of the candidates for the reference ship; empty for formulas
-    similarity: Mapping[str, float] | None = None
+    remarks: tuple[str, ...]  # what a user has to know of it
 
 
 def mmg_prior(source: str | ShipModel, particulars: Particulars) -> MMGPrior:
     """The prior of a reference ship in the MMG form, or of formulas.
 
-    `source`: a reference ship, "auto" for the one most like this ship, or
-    "yoshimura"; `particulars`: with service speed; beam, draught, block coefficient and
-    what of rudder and propeller is known. Raises InputError for a reference ship of
-    other equations or unlike this one, and particulars that do not suffice.
+    `source`: a reference ship, or "yoshimura"; `particulars`: with service speed; beam,
+    draught, block coefficient and what of rudder and propeller is known. Raises
+    InputError for a reference ship of other equations, and particulars that do not
+    suffice.
     """
     ship = completed(particulars)
     if isinstance(source, str) and source == YOSHIMURA:
-        prior = _formula_prior(ship)
+        name, column, remarks = source, 1, _out_of_range(ship)
+        mean = formula_coefficients(ship)
     else:
-        prior = _reference_prior(source, ship)
-
-    given = _given_added_mass(particulars)
-    prior.mean.update(given)
-    prior.mean["nD_U0"] = self_propulsion(prior.mean, ship)
-    return prior
-
-
-def _formula_prior(ship: Particulars) -> MMGPrior:
-    return MMGPrior(
-        source=YOSHIMURA,
-        ship=ship,
-        mean=formula_coefficients(ship),
-        deviation=np.array([DEVIATIONS[name][1] for name in IDENTIFIED]),
-        remarks=_out_of_range(ship),
-    )
+        model = _in_mmg_form(source)
+        name, column, remarks = model.name, 0, ()
+        mean = reference_coefficients(model)
+    mean |= _given_added_mass(particulars)
+    mean["nD_U0"] = self_propulsion(mean, ship)
+    deviation = np.array([DEVIATIONS[one][column] for one in IDENTIFIED])
+    return MMGPrior(name, ship, mean, deviation, remarks)
 
 
-def _reference_prior(source: str | ShipModel, ship: Particulars) -> MMGPrior:
-    """The prior of a reference ship.
-
-    Refused where she has other equations, and the best of the candidates where none is
-    like the ship.
-    """
-    model = _in_mmg_form(source, ship)
-    similarity = _similarity(model, ship)
-    like = similarity.get(model.name, 1.0)
-    if source == AUTO:
-        otherwise = "give prior = 'yoshimura' for formulas of the main dimensions"
-        check_alike(model.name, like, otherwise)
-    remarks: tuple[str, ...] = ()
-    if like < LEAST_SIMILARITY:
-        remarks = (
-            f"reference ship {model.name!r} is not like this one: similarity"
-            f" {like:.2f}; compare with prior = 'yoshimura'",
-        )
-    return MMGPrior(
-        source=model.name,
-        ship=ship,
-        mean=reference_coefficients(model),
-        deviation=np.array([DEVIATIONS[name][0] for name in IDENTIFIED]),
-        remarks=remarks,
-        similarity=similarity,
-    )
-
-
-def _similarity(model: ShipModel, ship: Particulars) -> dict[str, float]:
-    """Similarity of a reference ship, and of the others; empty if unknown."""
-    vectors = {model.name: similarity_vector(model.particulars)}
-    for name, make in REFERENCE_SHIPS.items():
-        if name != "mariner":
-            vectors[name] = similarity_vector(make().particulars.completed())
-    with suppress(InputError):  # too little may be known to compare
-        return correlations(similarity_vector(ship), vectors)
-    return {}
-
-
-def _in_mmg_form(source: str | ShipModel, ship: Particulars) -> ShipModel:
-    """The reference ship named, or the one most like a ship; of the MMG form."""
-    forms = ("kvlcc2", MMG)
-    of_form = [
-        name for name, make in REFERENCE_SHIPS.items() if make().structure in forms
-    ]
-    named = source
-    if source == AUTO:
-        named, _ = select_reference(ship, candidates=of_form)
-    model = named if isinstance(named, ShipModel) else load_model(named)
-    if model.structure not in forms:
+def _in_mmg_form(source: str | ShipModel) -> ShipModel:
+    """The reference ship named; InputError for one that is not of the MMG form."""
+    model = source if isinstance(source, ShipModel) else load_model(source)
+    if model.structure not in ("kvlcc2", MMG):
         raise InputError(
-            f"reference_model: expected a ship in the MMG form, one of"
-            f" {quoted(of_form)} or a model file of structure 'mmg', got"
-            f" {model.name!r}; or give prior = 'yoshimura' for formulas"
+            "prior: expected a ship in the MMG form, 'kvlcc2', 'kvlcc2-l7' or a model"
+            f" file of structure 'mmg', got {model.name!r}; or give prior ="
+            " 'yoshimura' for formulas"
         )
     return model
 

@@ -13,16 +13,15 @@ from functools import cached_property
 import numpy as np
 
 from identification.estimators.covariance import newey_west
-from identification.models.least_squares import (
+from identification.least_squares import (
     Linearised,
     fit_least_squares,
 )
 from identification.models.sailed import with_prior
 from identification.models.segments import BLOCK, Segment, velocities
-from identification.models.shooting import channel_units, in_all_lanes, sail_lanes
+from identification.models.shooting import channel_units, in_columns, sail
 from shipgym import ShipModel
 from shipgym.arrays import Floats, Integers
-from shipgym.engine.records import LANES
 from shipgym.trials.resampling import usual_step
 
 
@@ -150,7 +149,7 @@ class OutputError:
     ) -> tuple[Floats, Floats]:
         """Simulated channels, and their slopes by parameter and start.
 
-        Forward differences of parameters that are about 1: in each lane but the first
+        Forward differences of parameters that are about 1: in each column but the first
         one number of the ship or the start is larger by a step.
         """
         numbers = self.model.ship_numbers()
@@ -159,29 +158,18 @@ class OutputError:
         nominal = np.concatenate([numbers, segment.start])
         nominal[first_term:n_numbers] = coefficients
         starts = [n_numbers + column for column in self.free_columns]
-        varied = np.append(np.arange(first_term, n_numbers), starts).astype(int)
+        varied = [*range(first_term, n_numbers), *starts]
         units = np.append(self.term_sizes, channel_units(self.model, self.free))
 
         step = 1e-5
-        parts = []
-        for begin in range(0, len(varied), LANES - 1):
-            rows = varied[begin : begin + LANES - 1]
-            lane = 1 + np.arange(len(rows))
-            lanes = in_all_lanes(nominal)
-            lanes[rows, lane] += step * units[begin : begin + LANES - 1]
-
-            ships, begun = lanes[:n_numbers], lanes[n_numbers:]
-            sailed = sail_lanes(
-                self.model,
-                segment,
-                ships,
-                begun,
-            )[:, self.columns]
-            channels = sailed[:, :, 0]
-            with np.errstate(invalid="ignore", over="ignore"):  # of ships that ran away
-                changes = sailed[:, :, lane] - channels[:, :, None]
-                parts.append(changes / step)
-        return channels, np.concatenate(parts, axis=2)
+        columns = in_columns(nominal, 1 + len(varied))
+        columns[varied, range(1, 1 + len(varied))] += step * units
+        ships, begun = columns[:n_numbers], columns[n_numbers:]
+        sailed = sail(self.model, segment, ships, begun)[:, self.columns]
+        channels = sailed[:, :, 0]
+        with np.errstate(invalid="ignore", over="ignore"):  # of ships that ran away
+            slopes = (sailed[:, :, 1:] - channels[:, :, None]) / step
+        return channels, slopes
 
     def start_scales(self) -> Floats:
         """Scales of the residuals at the start; not finite where a ship runs away."""

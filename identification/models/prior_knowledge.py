@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from shipgym import InputError, ShipModel
 from shipgym.checks import check_number
+from shipgym.ships.hull_formulas import YOSHIMURA
 
 
 @dataclass(frozen=True, eq=False)
@@ -12,20 +13,19 @@ class PriorKnowledge:
 
     Parameters
     ----------
-    source : str, ShipModel or None
+    source : str or ShipModel
         "yoshimura" for the regression formulas of Yoshimura & Masumoto 2012, or a
-        reference ship in the MMG form: a model, its name or file, or "auto", the one
-        most like this ship. None: the `reference_model`, else the formulas.
+        reference ship in the MMG form: a model, its name or file.
     strength : float or None, above 0
         The number by which its standard deviations are divided. None chooses it by
         trials held out.
     """
 
-    source: str | ShipModel | None = None
+    source: str | ShipModel = YOSHIMURA
     strength: float | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.source, str | ShipModel | None):
+        if not isinstance(self.source, str | ShipModel):
             raise InputError(
                 "prior: expected a reference ship or the name of formulas, got"
                 f" {self.source!r}"

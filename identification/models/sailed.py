@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from identification.models.least_squares import Linearised, fit_least_squares
+from identification.least_squares import Linearised, fit_least_squares
 from identification.models.segments import Segment
-from identification.models.shooting import channel_units, in_all_lanes, sail_lanes
+from identification.models.shooting import channel_units, in_columns, sail
 from shipgym import ShipModel
 from shipgym.arrays import Floats, Integers
 from shipgym.engine.motion import Ship
-from shipgym.engine.records import LANES
 from shipgym.ships import Structure
 
 LARGEST = 1e3  # error of a ship that runs away, in scales
@@ -97,12 +96,7 @@ class Sailed:
         Shape (n_samples, n_channels, n_points). Not finite where a ship ran away.
         """
         coefficients = self.prior.coefficients(points)
-        numbers = self.blank.ship_numbers()
-        ships = np.repeat(
-            numbers[:, None],
-            len(points),
-            axis=1,
-        )
+        ships = in_columns(self.blank.ship_numbers(), len(points))
         ships[self._rows] = self._matrix @ coefficients.T
         return np.concatenate(
             [self._errors(part, ships) for part in self._parts(which)]
@@ -161,21 +155,10 @@ class Sailed:
 
     def _errors(self, part: Segment, ships: Floats) -> Floats:
         """Errors of ships, a column of numbers each, in a part, as in `errors`."""
-        tiles = []
-        for begin in range(0, ships.shape[1], LANES):
-            tile = ships[:, begin : begin + LANES]
-            n_ships = tile.shape[1]
-            full = np.pad(
-                tile,
-                ((0, 0), (0, LANES - n_ships)),
-                mode="edge",
-            )
-            starts = in_all_lanes(part.start)  # the ships move on from them
-            states = sail_lanes(self.blank, part, full, starts)
-            # at the first sample the ships have not moved yet
-            simulated = states[1:, self._columns, :n_ships]
-            tiles.append(simulated - part.measured[1:, :, None])
-        off = np.concatenate(tiles, axis=2)
+        # the ships move on from their start, at the first sample
+        starts = in_columns(part.start, ships.shape[1])
+        simulated = sail(self.blank, part, ships, starts)[1:, self._columns]
+        off = simulated - part.measured[1:, :, None]
         share = self._lengths(part) / len(off)
         return np.asarray(off * np.sqrt(share))
 

@@ -122,7 +122,10 @@ def segment_edges(t: Floats, duration: float, shift: float) -> Integers:
             0,
             dtype=int,
         )
-    count = max(round(span / duration - shift), 1)
+    count = max(
+        round(span / duration - shift),
+        1,
+    )
     begins = t[0] + skipped + np.arange(count) * (span - skipped) / count
     firsts, last = np.searchsorted(t, begins), len(t) - 1
     long_enough = (

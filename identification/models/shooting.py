@@ -24,17 +24,26 @@ def channel_units(model: ShipModel, channels: Sequence[str]) -> Floats:
     return np.array([units[name] for name in channels])
 
 
-def sail_lanes(
+def sail(model: ShipModel, segment: Segment, ships: Floats, starts: Floats) -> Floats:
+    """States of ships at the samples of a segment, shape (n_samples, n_state, n_ships).
+
+    Numbers of the ships and states at the start, a column for each.
+    """
+    n_ships = ships.shape[1]
+    tiles = []
+    for first in range(0, n_ships, LANES):
+        # the last ship fills the lanes that are left
+        lanes = np.minimum(first + np.arange(LANES), n_ships - 1)
+        tiles.append(_in_lanes(model, segment, ships[:, lanes], starts[:, lanes]))
+    return np.concatenate(tiles, axis=2)[:, :, :n_ships]
+
+
+def _in_lanes(
     model: ShipModel, segment: Segment, ships: Floats, starts: Floats
 ) -> Floats:
-    """States of the ships of all lanes at the samples of a segment.
-
-    Numbers of the ships and states at the start, a column for each lane. Shape
-    (n_samples, n_state, LANES).
-    """
-    loop = ship_loop(
-        model.compiled, "segments", OPEN_SEA if segment.has_wind else STILL_WATER
-    )
+    """The same of as many ships as there are lanes."""
+    sea = OPEN_SEA if segment.has_wind else STILL_WATER
+    loop = ship_loop(model.compiled, "segments", sea)
     n_samples = len(segment.measured)
     states = np.empty((n_samples, starts.size))
     state = starts.copy()
@@ -49,6 +58,6 @@ def sail_lanes(
     return states.reshape(n_samples, -1, LANES)
 
 
-def in_all_lanes(values: Floats) -> Floats:
-    """The same values in a column for each lane, shape (n_values, LANES)."""
-    return np.repeat(values, LANES).reshape(-1, LANES)
+def in_columns(values: Floats, number: int) -> Floats:
+    """The same values in so many columns, shape (n_values, number)."""
+    return np.repeat(values[:, None], number, axis=1)

@@ -10,13 +10,8 @@ from numpy.typing import ArrayLike
 from identification.arrays import by_name
 from shipgym import InputError, Particulars, ShipModel, load_model
 from shipgym.arrays import Floats
-from shipgym.checks import quoted
 from shipgym.models.catalogue import REFERENCE_SHIPS
 from shipgym.ships.particulars import with_estimates
-
-AUTO = "auto"
-# correlation below which a reference ship is unlike a ship, and not taken unnamed
-LEAST_SIMILARITY = 0.5
 
 
 def similarity_vector(particulars: Particulars) -> Floats:
@@ -74,12 +69,17 @@ def select_reference(
     in length, and the correlations of all candidates. Raises InputError if too little
     is known of the target.
     """
-    ships = _evaluable(candidates, channels)
-    vectors = {}
-    for name, ship in ships.items():
-        candidate = _with_rudder_area(name, ship)
-        vectors[name] = similarity_vector(candidate)
-    similarity = correlations(similarity_vector(particulars), vectors)
+    with_roll = channels is None or {"p", "phi"} <= set(channels)
+    ships, vectors = {}, {}
+    for name in candidates:
+        ship = load_model(name)
+        if with_roll or "phi" not in ship.state_names:
+            ships[name] = ship
+            vectors[name] = similarity_vector(_with_rudder_area(name, ship))
+    similarity = correlations(
+        similarity_vector(particulars),
+        vectors,
+    )
 
     same_hull = 0.01  # correlations so close are those of one hull form
     least = max(similarity.values()) - same_hull
@@ -91,40 +91,6 @@ def select_reference(
         return abs(float(np.log(scale))), -similarity[name]
 
     return min(alike, key=distance), similarity
-
-
-def _evaluable(
-    candidates: Collection[str], channels: Collection[str] | None
-) -> dict[str, ShipModel]:
-    """The candidates that can be evaluated at some channels, if these are known."""
-    with_roll = channels is None or {"p", "phi"} <= set(channels)
-    ships = {name: load_model(name) for name in candidates}
-    ships = {
-        name: ship
-        for name, ship in ships.items()
-        if with_roll or "phi" not in ship.state_names
-    }
-    if not ships:
-        raise InputError(
-            "reference_model: expected a ship that can be evaluated at"
-            f" {quoted(channels or ())}, got {quoted(candidates)}, all of which roll;"
-            " record p and phi, or allow other candidates"
-        )
-    return ships
-
-
-def check_alike(name: str, similarity: float, otherwise: str) -> None:
-    """Refuse the most similar reference ship where she is unlike the target.
-
-    `otherwise`: what else to do.
-    """
-    if similarity < LEAST_SIMILARITY:
-        raise InputError(
-            "reference_model: 'auto' expected a ship like this one, with a similarity"
-            f" of at least {LEAST_SIMILARITY:g}, got {name!r} with {similarity:.2f} as"
-            f" the best; {otherwise}, or name the ship all the same:"
-            f" reference_model = {name!r}"
-        )
 
 
 def _with_rudder_area(name: str, ship: ShipModel) -> Particulars:

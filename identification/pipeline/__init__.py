@@ -7,8 +7,10 @@ from typing import Any
 from identification.estimators.threads import single_threaded
 from identification.pipeline.by_regression import by_regression
 from identification.pipeline.options import AUTO, Options
-from identification.pipeline.result import IdentificationResult
+from identification.pipeline.result import IdentificationResult, with_provenance
 from identification.progress import announce
+from identification.samples.problem import held_out
+from identification.samples.still_water import in_still_water
 from shipgym import Trial
 from shipgym.ships.structures import MMG
 
@@ -40,17 +42,21 @@ def identify(
         For trials that excite nothing, lack channels or samples, and for particulars
         that do not suffice.
     """
-    asked = Options(
-        *arguments,
-        **options,
+    asked = Options(*arguments, **options)
+    marked, sea = in_still_water(
+        held_out(trials, asked.hold_out),
+        asked.particulars,
+        asked.current,
+        asked.wind,
     )
     if asked.kernel is None and asked.structure not in (AUTO, MMG):
-        return by_regression(trials, asked)
+        result = by_regression(marked, asked)
+    else:
+        from identification.pipeline.routes import identified
 
-    from identification.pipeline.routes import identified
-
-    announce(f"identifying {len(trials)} trials, some seconds")
-    return identified(trials, asked)
+        announce(f"identifying {len(marked)} trials, some seconds")
+        result = identified(marked, asked)
+    return with_provenance(result, sea)
 
 
 _TRIALS = inspect.signature(identify).parameters["trials"]

@@ -1,13 +1,9 @@
 """From trials to a ship model by the regression of each equation of motion."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
 
 from identification.estimators.covariance import without_trials
-from identification.estimators.estimator import FitTask
 from identification.judging.rudder_bias import with_bias
 from identification.models.guard import (
     GuardedFit,
@@ -24,13 +20,10 @@ from identification.pipeline.evaluation import (
 from identification.pipeline.options import Options
 from identification.pipeline.pose import pose
 from identification.pipeline.result import IdentificationResult
-from identification.samples.problem import Problem, held_out
+from identification.samples.problem import Problem
 from shipgym import ShipModel, Trial, list_structures
 from shipgym.ships import Structure, get_structure
 from shipgym.ships.structures import GREY_BOX
-
-if TYPE_CHECKING:
-    from identification.models.refine import Refined
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +31,8 @@ class RegressionFit:
     """A structure fitted by regression, and what it would be without some trials."""
 
     problem: Problem
-    task: FitTask
     method: Method
     fit: GuardedFit  # refined where the method asks for it
-    refined: Refined | None
 
     @property
     def model(self) -> ShipModel:
@@ -65,48 +56,32 @@ class RegressionFit:
         again from where that of all ended. The influence of a trial would not do: a
         turn that all but determines a fit hardly seems to move it.
         """
-        refined = self.refined
-        if refined is None or refined.covariance is None:
-            samples = self.task.samples
+        if self.fit.covariance is None:
+            samples = self.problem.samples
             estimators, _ = without_trials(self.fit.estimators, samples, trials)
             return with_coefficients(self.fit.model, estimators)
-        task = self.task.without(trials)
-        again = _refined(
-            self.fit,
-            task,
-            self.method,
-            rounds=1,
-        )
-        assert again is not None
-        return again.fit.model
+        others = self.problem.without(trials)
+        return _refined(self.fit, others, self.method, rounds=1).model
 
-    def result(
-        self, options: Options, sea: Mapping[str, Any] | None = None
-    ) -> IdentificationResult:
-        """The model with provenance, uncertainty and predictions of all trials.
-
-        `sea`: what is known of current and wind, where it was taken out before.
-        """
-        problem = replace(self.problem, sea={**self.problem.sea, **(sea or {})})
-        provenance = provenance_of(options, self._made_by, self.fit, problem)
-        if self.refined is not None:
-            provenance["refinement"] = self.refined.report
-        if options.uncertainty.by_sampling:
-            provenance["uncertainty"] = "posterior"
-        return with_uncertainty(
-            self.fit,
-            self.refined,
-            problem,
-            provenance,
+    def result(self, options: Options) -> IdentificationResult:
+        """The model with provenance, uncertainty and predictions of all trials."""
+        provenance = provenance_of(
             options,
-            self.without,
+            self._made_by,
+            self.fit,
+            self.problem,
+        )
+        if self.fit.refinement is not None:
+            provenance["refinement"] = self.fit.refinement
+        return with_uncertainty(
+            self.fit, self.problem, provenance, options, self.without
         )
 
     @property
     def _made_by(self) -> str:
         """Name of the method that made the numbers: the start's, where that stayed."""
         refinement = self.method.refinement
-        if refinement is None or (self.refined and self.refined.covariance is not None):
+        if refinement is None or self.fit.covariance is not None:
             return self.method.name
         return get_method(refinement.start).name
 
@@ -123,11 +98,8 @@ def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationRe
             method=_by_heading(trials),
         )
     found = fit_regression(trials, options)
-    biased = with_rudder_bias(found, options)
-    if biased is None:
-        return found.result(options)
-    own, fit = biased
-    return fit.result(own, found.problem.sea)
+    own, fit = with_rudder_bias(found, options)
+    return fit.result(own)
 
 
 def differentiates_heading(trials: Sequence[Trial], options: Options) -> bool:
@@ -136,18 +108,12 @@ def differentiates_heading(trials: Sequence[Trial], options: Options) -> bool:
     Differentiation biases a regression on them, but not what is fitted to the heading.
     """
     table = options.structure
-    if table == GREY_BOX:
+    if table in list_structures() and table != GREY_BOX:
+        table = get_structure(str(table))
+    if not isinstance(table, Structure) or set(table.equations) != {"r"}:
         return False
-    if isinstance(table, str) and table in list_structures():
-        table = get_structure(table)
-    is_response = isinstance(table, Structure) and set(table.equations) == {"r"}
-    if not is_response:
-        return False
-    derived = []
-    for trial in held_out(trials, options.hold_out):
-        if trial.use == "fit":
-            derived.append("r" in trial.derived and "psi" in trial)
-    return all(derived)
+    fitted = [trial for trial in trials if trial.use == "fit"]
+    return all("r" in trial.derived and "psi" in trial for trial in fitted)
 
 
 def _by_heading(trials: Sequence[Trial]) -> Refinement:
@@ -159,48 +125,40 @@ def _by_heading(trials: Sequence[Trial]) -> Refinement:
 
 def with_rudder_bias(
     found: RegressionFit, options: Options
-) -> tuple[Options, RegressionFit] | None:
+) -> tuple[Options, RegressionFit]:
     """Options and fit of the same structure with the constant of a biased rudder.
 
-    None where there is none to add, or where the fit with it runs away.
+    As they were where there is none to add, or where the fit with it runs away.
     """
-    if options.rudder_bias == "none":
-        return None
-    table = with_bias(found.model, found.problem)
+    table = None
+    if options.rudder_bias != "none":
+        table = with_bias(found.model, found.problem)
     if table is None:
-        return None
-    own = replace(options, structure=table)
-    calm = replace(own, current="none", wind="none", hold_out=())
-    fit = fit_regression(found.problem.trials, calm)
-    return (own, fit) if fit.stable else None
+        return options, found
+    own = replace(
+        options,
+        structure=table,
+    )
+    fit = fit_regression(found.problem.trials, own)
+    return (own, fit) if fit.stable else (options, found)
 
 
 def fit_regression(trials: Sequence[Trial], options: Options) -> RegressionFit:
     """The fit of `by_regression`, before its uncertainty and predictions."""
     problem = pose(trials, options)
-    task = FitTask(problem.samples, problem.blank, problem.used)
     method = get_method(options.method)
-    fit = guarded_fit(method, task, options.guarded)
-    refined = _refined(fit, task, method)
-    if refined is not None:
-        fit = refined.fit
-    return RegressionFit(
-        problem,
-        task,
-        method,
-        fit,
-        refined,
-    )
+    fit = guarded_fit(method, problem, options.guarded)
+    return RegressionFit(problem, method, _refined(fit, problem, method))
 
 
 def _refined(
-    fit: GuardedFit, task: FitTask, method: Method, rounds: int = 3
-) -> Refined | None:
-    """The fit refined as the method asks for; None where it does not."""
+    fit: GuardedFit, problem: Problem, method: Method, rounds: int = 3
+) -> GuardedFit:
+    """The fit, refined where the method asks for it."""
     if method.refinement is None:
-        return None
+        return fit
 
     from identification.models.refine import refine
 
-    memory = MEMORY * task.blank.travel_time
-    return refine(fit, task, method.refinement, memory, rounds)
+    memory = MEMORY * problem.blank.travel_time
+    return refine(fit, problem, method.refinement, memory, rounds)

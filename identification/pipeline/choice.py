@@ -1,13 +1,11 @@
 """Structures and methods tried on the same trials, for `structure = "auto"`."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
-from identification.judging.rudder_bias import with_bias
 from identification.judging.selection import (
     RESPONSES,
-    Fitted,
     RankedFit,
     fit_name,
     rank_by_likelihood,
@@ -15,8 +13,8 @@ from identification.judging.selection import (
 )
 from identification.models.refinement import Refinement, whole_trials
 from identification.models.similarity import with_usual_hull
+from identification.pipeline.by_regression import with_rudder_bias
 from identification.pipeline.options import MAP, Options, name_of
-from identification.pipeline.result import IdentificationResult
 from identification.progress import counted
 from identification.samples.folds import pieces
 from shipgym import InputError, Trial
@@ -38,24 +36,15 @@ RM_SVM = "rm-svm"
 REFINED = ("linear-steering", "steering7", "abkowitz", "cubic")
 
 
-class Candidate(Fitted, Protocol):
-    """A structure fitted to trials, from which a result can be made."""
-
-    def result(
-        self, options: Options, sea: Mapping[str, Any] | None = None
-    ) -> IdentificationResult:
-        """The model with uncertainty and predictions."""
-
-
 #: From trials and options of a structure that is named to its fit.
-FitTrials = Callable[[Sequence[Trial], Options], Candidate]
+FitTrials = Callable[[Sequence[Trial], Options], Any]
 
 
 class Choice(NamedTuple):
     """The structure and method that predict best."""
 
     options: Options
-    fit: Candidate  # of all trials
+    fit: Any  # of all trials
     report: dict[str, Any]  # the ranking, for the provenance
 
 
@@ -108,7 +97,7 @@ def select(
     if single:
         whole = fit(trials, own)
     found = Choice(own, whole, report)
-    if options.rudder_bias == "none":
+    if options.rudder_bias == "none" or best.structure == MMG:
         return found
     return _with_bias(found, fit, trials)
 
@@ -121,18 +110,15 @@ def _with_bias(choice: Choice, fit: FitTrials, trials: Sequence[Trial]) -> Choic
     """
     options, report = choice.options, choice.report
     biased = f"{name_of(options.structure)}-bias"
-    is_response = biased in RESPONSES and isinstance(options.method, Refinement)
-    table = biased if is_response else with_bias(choice.fit.model, choice.fit.problem)
-    if table is None:
-        return choice
-    options = replace(options, structure=table)
-    other = fit(trials, options)
-    if is_response:
-        bias = other.result(options).metrics.get("rudder_bias")
-        report = report | {"rudder_bias": bias}
-        if bias is None or not bias["significant"]:
-            return choice._replace(report=report)
-    return Choice(options, other, report) if other.stable else choice
+    if biased not in RESPONSES or not isinstance(options.method, Refinement):
+        return Choice(*with_rudder_bias(choice.fit, options), report)
+    asked = replace(options, structure=biased)
+    other = fit(trials, asked)
+    bias = other.result(asked).metrics.get("rudder_bias")
+    report = report | {"rudder_bias": bias}
+    if bias is None or not bias["significant"] or not other.stable:
+        return choice._replace(report=report)
+    return Choice(asked, other, report)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,19 +130,19 @@ class _Attempts:
     options: Options
     ranked: list[RankedFit] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)  # why, by name
-    fits: dict[str, tuple[Options, Candidate]] = field(default_factory=dict)  # by name
+    fits: dict[str, tuple[Options, Any]] = field(default_factory=dict)  # by name
 
     def add(self, structure: str, method: Any) -> None:
         """Try a structure and a method, or remember why it cannot be fitted."""
-        by_reference = structure in (GREY_BOX, MMG)
+        asked = self.options
         own = replace(
-            self.options,
+            asked,
             structure=structure,
             method=method,
-            reference_model=self.options.reference_model if by_reference else None,
-            prior=self.options.prior if structure == MMG else None,
+            reference_model=asked.reference_model if structure == GREY_BOX else None,
+            prior=asked.prior if structure == MMG else None,
         )
-        if by_reference and own.particulars is not None:
+        if structure in (GREY_BOX, MMG) and own.particulars is not None:
             own = replace(own, particulars=with_usual_hull(own.particulars))
         by = MAP if structure == MMG else name_of(method)
         name = fit_name(structure, by)

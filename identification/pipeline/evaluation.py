@@ -1,10 +1,8 @@
 """An identified model: how it came about, its uncertainty, and its predictions."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +22,7 @@ from identification.judging.model_error import (
 from identification.judging.prediction import trial_metrics
 from identification.judging.rudder_bias import rudder_bias
 from identification.models.guard import GuardedFit, with_coefficients
+from identification.models.sailed import CoefficientPrior
 from identification.pipeline.options import (
     Options,
     name_of,
@@ -38,9 +37,6 @@ from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.manoeuvres.measured import measured_indices
 from shipgym.ships import GreyBox
-
-if TYPE_CHECKING:
-    from identification.models.refine import Refined
 
 MEMORY = 1.0  # of residuals, in the time to sail one ship length
 
@@ -94,48 +90,70 @@ def _trial_record(trial: Trial) -> dict[str, Any]:
 
 def with_uncertainty(
     fit: GuardedFit,
-    refined: Refined | None,
     problem: Problem,
     provenance: dict[str, Any],
     options: Options,
     without: Without | None = None,
 ) -> IdentificationResult:
-    """The result of a fit, its covariance scaled by the model error.
+    """The result of a fit by regression, its covariance scaled by the model error.
 
     `without`: the model of the other trials, where it is known.
     """
-    influences = None
-    if refined is None or refined.covariance is None:
-        covariance = _of_regression(fit, problem.samples, problem.blank)
-    else:
-        matrix = problem.blank.acceleration_matrix
-        covariance = coefficient_covariance(refined.covariance, matrix)
-        influences = refined.influences
+    covariance = _of_fit(fit, problem)
     model = replace(fit.model, covariance=covariance)
-    asked = options.uncertainty
-    if asked.model_error:
+    if options.uncertainty.model_error:
         again = without if is_yaw_alone(model) else None
-        left_out = left_out_models(
-            fit,
-            problem,
-            model,
-            influences,
-            again,
-        )
+        left_out = left_out_models(fit, problem, model, again)
         error = model_error(model, left_out, problem.used)
         model = replace(model, covariance=error["factor"] ** 2 * covariance)
-        if without is not None and fit.stable and not asked.by_sampling:
-            model, beyond = beyond_trials(model, without, problem.used)
-            error = error | beyond
-            model = with_sound_draws(model, problem.used)
-        provenance = provenance | {"model_error": error}
+        provenance["model_error"] = error
+    return certain(
+        model,
+        fit,
+        problem,
+        provenance,
+        options,
+        without,
+    )
+
+
+def certain(
+    model: ShipModel,
+    fit: GuardedFit,
+    problem: Problem,
+    provenance: dict[str, Any],
+    options: Options,
+    without: Without | None,
+    prior: CoefficientPrior | None = None,
+) -> IdentificationResult:
+    """The result of a model with covariance: widened beyond the trials, or sampled.
+
+    `prior`: of a posterior; by default that of a table.
+    """
+    asked, used = options.uncertainty, problem.used
     if asked.by_sampling:
         from identification.judging.posterior import table_prior, with_posterior
 
-        prior = table_prior(model)
-        model, report = with_posterior(model, problem.used, prior, asked)
-        provenance = provenance | {"posterior": report}
+        prior = prior or table_prior(model)
+        model, report = with_posterior(model, used, prior, asked)
+        provenance |= {"uncertainty": "posterior", "posterior": report}
+    elif without is not None and fit.stable and asked.model_error:
+        model, beyond = beyond_trials(model, without, used)
+        provenance["model_error"] |= beyond
+        model = with_sound_draws(model, used)
     return evaluated(model, fit, problem, provenance, options)
+
+
+def _of_fit(fit: GuardedFit, problem: Problem) -> Floats:
+    """Covariance of the coefficients of a fit, refined or by regression alone."""
+    if fit.covariance is None:
+        return _of_regression(
+            fit,
+            problem.samples,
+            problem.blank,
+        )
+    matrix = problem.blank.acceleration_matrix
+    return coefficient_covariance(fit.covariance, matrix)
 
 
 def _of_regression(fit: GuardedFit, samples: Samples, blank: ShipModel) -> Floats:
@@ -152,7 +170,6 @@ def left_out_models(
     fit: GuardedFit,
     problem: Problem,
     model: ShipModel,
-    influences: Sequence[Floats] | None,
     without: Without | None,
 ) -> list[ShipModel]:
     """The models, with covariance, of fits without each of the trials.
@@ -166,7 +183,7 @@ def left_out_models(
     inflation = n_trials / (n_trials - 1)
     found = []
     for trial in range(n_trials):
-        if influences is None:
+        if fit.covariance is None:
             estimators, rows = without_trials(
                 fit.estimators,
                 problem.samples,
@@ -179,7 +196,7 @@ def left_out_models(
             own = without([trial])
             covariance = inflation * np.asarray(model.covariance)
         else:
-            moved = influences[trial].sum(axis=0)
+            moved = fit.influences[trial].sum(axis=0)
             change = np.linalg.solve(model.acceleration_matrix, moved)
             values = np.array(list(model.coefficients.values()))
             own = model.with_coefficients(values - inflation * change)
@@ -202,7 +219,7 @@ def evaluated(
     trials = tuple(trial for trial in problem.trials if trial.use != "skip")
     predictions = {trial.name: predict(model, trial) for trial in trials}
     lost = [name for name, predicted in predictions.items() if predicted is None]
-    complete = {**provenance, **problem.sea}
+    complete = dict(provenance)
     measured = {
         trial.name: measured_indices(model, trial, predictions[trial.name])
         for trial in problem.used

@@ -65,8 +65,8 @@ class Options:
     preprocessing : str or Preprocessing
         How noisy channels are smoothed, and whether outliers are repaired.
     reference_model : str, ShipModel or None
-        Reference ship of a grey box or of the prior of `mmg`: a model, its name or
-        file, or "auto", the one most like this ship.
+        Reference ship of a grey box: a model, its name or file, or "auto", the one
+        most like this ship.
     kernel : str, KernelResidual or None
         Kernel of an LS-SVM on what a reference ship leaves.
     prior : str, ShipModel, PriorKnowledge or None

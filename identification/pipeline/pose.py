@@ -8,10 +8,9 @@ import numpy as np
 from identification.pipeline.options import Given, Options, name_of
 from identification.samples.checks import check_samples, check_trials
 from identification.samples.preprocess import repaired
-from identification.samples.problem import Problem, held_out
+from identification.samples.problem import Problem
 from identification.samples.rudder import estimated_gear
 from identification.samples.samples import build_samples
-from identification.samples.still_water import in_still_water
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.arrays import Floats
 from shipgym.ships import Envelope, Structure, Term, get_structure
@@ -30,13 +29,8 @@ MMG_CHANNELS = Structure(
 def pose(trials: Sequence[Trial], options: Options) -> Problem:
     """Check trials and options, and make the regression; errors as in `identify`."""
     particulars = options.particulars
-    everything, sea = in_still_water(
-        held_out(trials, options.hold_out),
-        particulars=particulars,
-        current=options.current,
-        wind=options.wind,
-    )
-    used = [trial for trial in everything if trial.use == "fit"]
+    everything = list(trials)
+    used = [trial for trial in trials if trial.use == "fit"]
     if options.preprocessing.repair:
         used = [repaired(trial) for trial in used]
 
@@ -81,7 +75,6 @@ def pose(trials: Sequence[Trial], options: Options) -> Problem:
         table=table,
         samples=samples,
         similarity=similarity,
-        sea=sea,
         sampling=sampling,
     )
 
@@ -116,8 +109,6 @@ def _table(
 ) -> tuple[Structure, dict[str, float]]:
     """The structure; for a grey box also the similarity of the candidates."""
     structure, reference = options.structure, options.reference_model
-    if structure == MMG:
-        return MMG_CHANNELS, {}
     if structure == GREY_BOX:
         from identification.models.grey_box import chosen_box
 
@@ -129,9 +120,11 @@ def _table(
         raise InputError(
             "reference_model: expected none with structure"
             f" {name_of(structure)!r}, got {name_of(reference)!r}; leave it out, or"
-            " choose structure 'grey-box' (to pull coefficients to a ship's, give"
+            " choose structure 'grey-box' (what pulls the coefficients of 'mmg' is its"
             " prior)"
         )
+    if structure == MMG:
+        return MMG_CHANNELS, {}
     if not isinstance(structure, Structure):
         structure = get_structure(str(structure))
     return structure, {}

@@ -65,7 +65,10 @@ def read_table(table: Any, where: str) -> dict[str, Any]:
     """
     known = option_names()
     found: dict[str, Any] = {}
-    for name, value in check_table(table, where).items():
+    for name, value in check_table(
+        table,
+        where,
+    ).items():
         own = {name: value}
         if name in WORDS and isinstance(value, Mapping):
             own = {f"{name}.{setting}": one for setting, one in value.items()}

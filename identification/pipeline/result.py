@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from html import escape
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,11 +36,6 @@ class IdentificationResult(Fit):
         """Return a card of a few lines: the verdict, errors and coefficients."""
         return result_card(self)
 
-    def _repr_html_(self) -> str:
-        """Return the card and a table of the coefficients, for a notebook."""
-        table: str = self.to_frame().to_html(float_format="%.4g")
-        return f"<pre>{escape(result_card(self))}</pre>{table}"
-
     def to_frame(self) -> DataFrame:
         """Return a row for each coefficient: value, standard error and t."""
         from pandas import DataFrame
@@ -59,7 +55,10 @@ class IdentificationResult(Fit):
         rows = {}
         for name, metrics in self.metrics["trials"].items():
             rows[name] = {"use": metrics["use"], **metrics["rmse"]}
-        return DataFrame.from_dict(rows, orient="index")
+        return DataFrame.from_dict(
+            rows,
+            orient="index",
+        )
 
     def plot(self, channel: str = "psi", trial: str = "", ax: Any = None) -> Any:
         """Draw a trial as measured and as predicted on axes of matplotlib.
@@ -117,3 +116,14 @@ class IdentificationResult(Fit):
         self.model.save(folder / "model.json")
         write_json(self.metrics, folder / "metrics.json")
         write_json(self.settings, folder / "settings.json")
+
+
+def with_provenance(
+    result: IdentificationResult, further: Mapping[str, Any]
+) -> IdentificationResult:
+    """The result with more in the provenance of its model."""
+    provenance = {**(result.model.provenance or {}), **further}
+    return replace(
+        result,
+        model=replace(result.model, provenance=provenance),
+    )

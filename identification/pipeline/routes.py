@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 from identification.estimators.estimator import Estimators
 from identification.estimators.kernel_residual import KernelResidual
-from identification.judging.extrapolation import beyond_trials
 from identification.models.guard import GuardedFit, reasons_unstable
-from identification.models.kernel_fit import (
-    INPUT_CHANNELS,
-    fit_kernel,
-)
+from identification.models.kernel_fit import fit_kernel
 from identification.models.maximum_a_posteriori import (
     MMGFit,
     fit_mmg,
@@ -27,7 +24,7 @@ from identification.pipeline.by_regression import (
 )
 from identification.pipeline.choice import select
 from identification.pipeline.evaluation import (
-    evaluated,
+    certain,
     provenance_of,
     with_uncertainty,
 )
@@ -39,10 +36,8 @@ from identification.pipeline.options import (
     whole_call,
 )
 from identification.pipeline.pose import pose
-from identification.pipeline.result import IdentificationResult
-from identification.samples.preprocess import smoothed_channels
-from identification.samples.problem import Problem, held_out
-from identification.samples.still_water import in_still_water
+from identification.pipeline.result import IdentificationResult, with_provenance
+from identification.samples.problem import Problem
 from shipgym import InputError, ShipModel, Trial
 from shipgym.models.catalogue import fitted_box
 from shipgym.ships import GreyBox, Structure
@@ -61,32 +56,14 @@ def identified(trials: Sequence[Trial], options: Options) -> IdentificationResul
 
 
 def by_selection(trials: Sequence[Trial], options: Options) -> IdentificationResult:
-    """By the structure and method that predict trials to fit best, each held out.
-
-    Current and wind are taken out once, for all of them.
-    """
-    marked, sea = in_still_water(
-        held_out(trials, options.hold_out),
-        particulars=options.particulars,
-        current=options.current,
-        wind=options.wind,
-    )
-    calm = replace(options, current="none", wind="none", hold_out=())
-    choice = select(fitted, marked, calm)
-    asked = replace(
-        choice.options,
-        current=options.current,
-        wind=options.wind,
-        hold_out=options.hold_out,
-    )
-    best = choice.fit.result(asked, sea)
+    """By the structure and method that predict trials to fit best, each held out."""
+    choice = select(fitted, trials, options)
+    best: IdentificationResult = choice.fit.result(choice.options)
     selection = {"selection": choice.report}
-    provenance = best.model.provenance or {}
     return replace(
-        best,
-        model=replace(best.model, provenance=provenance | selection),
+        with_provenance(best, selection),
         metrics=best.metrics | selection,
-        settings=whole_call(options, marked),
+        settings=whole_call(options, trials),
     )
 
 
@@ -121,15 +98,7 @@ def by_kernel(
     if not isinstance(box, GreyBox):
         reference = identified(trials, beneath).model
         box = fitted_box(reference)
-    smoothing = options.preprocessing.smoothing
-    found = fit_kernel(
-        kernel,
-        reference,
-        problem.used,
-        box,
-        [smoothed_channels(one, INPUT_CHANNELS, smoothing) for one in problem.used],
-        lambda table: problem.rows_of(table, reference),
-    )
+    found = fit_kernel(kernel, reference, problem, box)
     problem = replace(
         problem,
         blank=found.model,
@@ -140,7 +109,7 @@ def by_kernel(
     fit = _guard_report(found.model, found.estimators, reasons)
     provenance = provenance_of(options, method, fit, problem)
     provenance["kernel"] = found.report
-    return with_uncertainty(fit, None, problem, provenance, options)
+    return with_uncertainty(fit, problem, provenance, options)
 
 
 def _check_beneath(table: Structure) -> None:
@@ -184,36 +153,17 @@ class SimulationFit:
         """The model of the other trials, by their places."""
         return self.fit.without(trials)
 
-    def result(
-        self, options: Options, sea: Mapping[str, Any] | None = None
-    ) -> IdentificationResult:
-        """The model with provenance and predictions.
-
-        `sea`: what is known of current and wind, where it was taken out before.
-        """
+    def result(self, options: Options) -> IdentificationResult:
+        """The model with provenance and predictions."""
         options = checked_mmg(options)
-        problem, model = self.problem, self.model
-        problem = replace(problem, blank=model, sea={**problem.sea, **(sea or {})})
+        model = self.model
+        problem = replace(self.problem, blank=model)
         fit = _guard_report(model, {}, self.reasons)
-        provenance = provenance_of(options, MAP, fit, problem)
-        report = dict(self.fit.report)
-        asked = options.uncertainty
-        if asked.by_sampling:
-            from identification.judging.posterior import with_posterior
-
-            prior = self.fit.prior
-            model, posterior = with_posterior(model, problem.used, prior, asked)
-            report |= {"uncertainty": "posterior", "posterior": posterior}
-        elif asked.model_error and self.stable:
-            model, beyond = beyond_trials(model, self.without, problem.used)
-            report["model_error"] = report["model_error"] | beyond
-        return evaluated(
-            model,
-            fit,
-            problem,
-            provenance | report,
-            options,
+        provenance = provenance_of(options, MAP, fit, problem) | deepcopy(
+            self.fit.report
         )
+        prior = self.fit.prior
+        return certain(model, fit, problem, provenance, options, self.without, prior)
 
 
 def by_simulation(trials: Sequence[Trial], options: Options) -> IdentificationResult:
@@ -226,11 +176,6 @@ def fit_simulation(trials: Sequence[Trial], options: Options) -> SimulationFit:
     options = checked_mmg(options)
     problem = pose(trials, options)
     asked = options.prior or PriorKnowledge()
-    if options.reference_model is not None:
-        asked = replace(
-            asked,
-            source=options.reference_model,
-        )
     return SimulationFit(problem, fit_mmg(problem.blank, problem.used, asked))
 
 
@@ -245,14 +190,6 @@ def checked_mmg(options: Options) -> Options:
             f" {name_of(options.method)!r}; it is not linear in its coefficients and is"
             " fitted by simulation error with a prior: leave the method and its"
             " settings out, or choose another structure"
-        )
-    prior = None if options.prior is None else options.prior.source
-    if prior is not None and options.reference_model is not None:
-        raise InputError(
-            "reference_model: expected it without prior, got"
-            f" {name_of(options.reference_model)!r} and prior {name_of(prior)!r}; the"
-            " coefficients of structure 'mmg' are pulled to one reference ship, or to"
-            " formulas"
         )
     return replace(options, method=MAP)
 

@@ -1,6 +1,7 @@
 """Rows that text and pages show of a fit, and the text that `summary` prints."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any, NamedTuple
 
 from identification.judging.fit import Fit
@@ -8,22 +9,9 @@ from identification.judging.sentences import error_source, findings
 from identification.judging.warnings import held_out_error, inseparable
 from identification.text import as_text, lined_table
 from shipgym import ShipModel
-from shipgym.pages.numbers import MINUS, NONE, fixed, number
-from shipgym.ships.particulars import ADDED_MASSES
+from shipgym.pages.numbers import NONE, fixed, number
 
 PRIME = 1e-5
-#: Particulars of the ship: name, unit, and the factor to it from the SI unit.
-PARTICULARS = {
-    "length": ("length between perpendiculars", "m", 1.0),
-    "beam": ("beam", "m", 1.0),
-    "draught": ("draught", "m", 1.0),
-    "block_coefficient": ("block coefficient", "", 1.0),
-    "mass": ("mass", "t", 1e-3),
-    "xg": ("centre of gravity forward of midship", "m", 1.0),
-    "yaw_gyradius": ("yaw gyradius", "m", 1.0),
-    "speed": ("service speed", "m/s", 1.0),
-    "water_density": ("water density", "kg/m³", 1.0),
-}
 
 
 class CoefficientRow(NamedTuple):
@@ -46,7 +34,7 @@ def summary_table(fit: Fit) -> str:
     for row in coefficient_rows(fit):
         coefficients.add_row(*row[:4])
     ship = lined_table(
-        "Ship and steering gear",
+        "Ship and steering gear, as in a ship file",
         "name",
         ">value",
         "source",
@@ -65,20 +53,14 @@ def summary_table(fit: Fit) -> str:
 
 
 def result_card(fit: Fit) -> str:
-    """The result in a few lines: verdict, held-out error, coefficients, what next."""
-    trials = fit.metrics["trials"].values()
-    uses = [one["use"] for one in trials]
-    rows = sorted(coefficient_rows(fit), key=lambda row: not row.significant)
-    shown = ", ".join(f"{row.name} {row.value} ± {row.error}" for row in rows[:4])
-    significant = sum(row.significant for row in rows)
-    lines = [
-        f"{fit.model.name}: {how_identified(fit)}; {_verdict(fit)}",
-        f"trials: {uses.count('fit')} fitted, {uses.count('validate')} held out",
-        held_out_error(fit),
-        f"{len(rows)} coefficients, {significant} differ from zero: {shown}, ...",
-        "more: summary(), to_frame(), trials_frame(), model, metrics, save(folder)",
-    ]
-    return "\n".join(lines)
+    """The result in a few lines: verdict, held-out error, what next."""
+    return "\n".join(
+        [
+            f"{fit.model.name}: {how_identified(fit)}; {_verdict(fit)}",
+            held_out_error(fit),
+            "more: summary(), to_frame(), trials_frame(), model, metrics, save(folder)",
+        ]
+    )
 
 
 def how_identified(fit: Fit) -> str:
@@ -148,27 +130,14 @@ def coefficient_rows(fit: Fit) -> list[CoefficientRow]:
 
 
 def quantities(model: ShipModel) -> list[tuple[str, str, str]]:
-    """Particulars, added masses and steering gear: name, where from, and value."""
+    """Particulars and steering gear by their names in a ship file: source and value."""
     ship = model.particulars
-    rows = _gear_rows(model)
-    for name, (words, unit, factor) in PARTICULARS.items():
-        if ship[name] is not None:
-            digits = f"{factor * ship[name]:.5g}".replace("-", MINUS)
-            rows.append((words, name in ship.estimated, f"{digits} {unit}"))
-    for name in ADDED_MASSES:
-        if ship[name] is not None:
-            value = fixed(ship[name] / PRIME, 1)
-            rows.append((f"{name}, 10⁻⁵", name in ship.estimated, value))
-    sources = {True: "estimated", False: "given"}
-    return [(name, sources[guess], value) for name, guess, value in rows]
-
-
-def _gear_rows(model: ShipModel) -> list[tuple[str, bool, str]]:
-    """Steering gear: name, whether estimated, and value."""
-    gear = model.steering
+    rows = [(name, name in ship.estimated, ship[name]) for name in ship]
     estimated = (model.provenance or {}).get("steering") == "estimated"
+    rows += [(name, estimated, one) for name, one in asdict(model.steering).items()]
+    sources = {True: "estimated", False: "given"}
     return [
-        ("rudder limit", estimated, f"{number(gear.rudder_limit_deg)} deg"),
-        ("rudder rate", estimated, f"{number(gear.rudder_rate_deg_s)} deg/s"),
-        ("rudder lag", estimated, f"{number(gear.time_constant, 2)} s"),
+        (name, sources[guess], f"{value:.5g}")
+        for name, guess, value in rows
+        if isinstance(value, float)
     ]

@@ -1,18 +1,15 @@
-"""Figures of an identification: its trials, residuals and rank."""
+"""Figures of an identification: its trials and rank."""
 
 from pathlib import PurePath
 
 import numpy as np
 
-from identification.estimators.covariance import residuals
 from identification.estimators.lssvm import TruncatedLSSVM
-from identification.judging.diagnostics import autocorrelation, without_overlap
 from identification.judging.fit import Fit
 from identification.judging.warnings import EQUATIONS
 from shipgym import Trial
-from shipgym.manoeuvres.quantiles import NORMAL_95
 from shipgym.plots import Panel, axis, line, panels, points
-from shipgym.plots.style import LIMIT, MODEL, MUTED, Figure
+from shipgym.plots.style import LIMIT, MUTED, Figure
 from shipgym.plots.trials import history_panel, path_panel
 
 RUDDER = "#9aa5b1"
@@ -26,8 +23,8 @@ def plots(fit: Fit) -> dict[str, Figure]:
     Returns
     -------
     dict of str to plotly.graph_objects.Figure
-        "residuals" (autocorrelation), "l-curve" for the method that has one, "trials",
-        and "prediction: NAME" for each trial held out.
+        "l-curve" for the method that has one, "trials", and "prediction: NAME" for each
+        trial held out.
     """
     found = regression_figures(fit)
     overview = overview_figure(fit)
@@ -41,43 +38,16 @@ def plots(fit: Fit) -> dict[str, Figure]:
 
 
 def regression_figures(fit: Fit) -> dict[str, Figure]:
-    """Figures of the regression by name; "l-curve" only where a rank was chosen."""
-    found = {}
-    if fit.estimators:
-        found["residuals"] = residual_figure(fit)
-    curves = {
-        q: estimator
+    """The L-curves, where a rank was chosen by them."""
+    shown = [
+        _l_curve_panel(q, estimator)
         for q, estimator in fit.estimators.items()
         if isinstance(estimator, TruncatedLSSVM) and estimator.selection != "full"
-    }
-    if curves:
-        shown = [_l_curve_panel(q, estimator) for q, estimator in curves.items()]
-        found["l-curve"] = panels(
-            shown, 360, len(shown), outer=True, left=70, hovermode="closest"
-        )
-    return found
-
-
-def residual_figure(fit: Fit) -> Figure:
-    """Autocorrelation of the residuals, with 95 % bounds of white noise."""
-    rows = without_overlap(fit.samples)
-    bound = NORMAL_95 / np.sqrt(len(rows))
-    shown = []
-    for q, error in residuals(fit.estimators, fit.samples).items():
-        own = autocorrelation(error[rows], 24)
-        bars = {"type": "bar", "x": np.arange(1, 25), "y": own, "name": q}
-        traces = [{**bars, "marker": {"color": MODEL}, "showlegend": False}]
-        for level in (-bound, bound):
-            ends = [level] * 2
-            traces.append(line([0.5, 24.5], ends, "95 % of white noise", LIMIT, 1.2))
-        shown.append(Panel(traces, "lag, windows", EQUATIONS[q]))
-    return panels(
-        shown,
-        170 * len(shown) + 100,
-        1,
-        outer=True,
-        bargap=0.5,
-    )
+    ]
+    if not shown:
+        return {}
+    figure = panels(shown, 360, len(shown), outer=True, left=70, hovermode="closest")
+    return {"l-curve": figure}
 
 
 def _l_curve_panel(q: str, estimator: TruncatedLSSVM) -> Panel:

@@ -16,8 +16,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
+from identification.least_squares import Linearised, fit_least_squares
 from identification.samples.runs_on_grid import (
     STEP,
     Runs,
@@ -135,14 +135,24 @@ class _Problem:
         self.weights = 1.0 / deviations
 
     def simulated(self, x: Floats) -> Floats:
-        """Mean velocities over windows, without current: north, east and ahead.
+        """Mean velocities over windows: over ground north and east, and ahead.
 
-        Shape (n_windows, 3, n_lanes, n_trials). The first lane has the unknowns as
-        given, then follow lanes in which each of the coefficients, and u and v at the
-        start, are moved by `DIFFERENCE`.
+        Shape (n_windows, 3, n_rows, n_trials), of unknowns of shape (n_rows,
+        n_unknowns).
         """
-        c = _coefficients_by_lane(x[:N_COEFFICIENTS])
-        u, v = self._starts_by_lane(x, n_lanes=c.shape[1])
+        ahead, aside = self._sailed(x)
+        heading = self.runs.psi[:, None]
+        north, east = rotate_to_body(ahead, aside, -heading)
+        means = window_means(np.stack([north, east, ahead], axis=1))
+        means[:, :2] += np.moveaxis(x[:, self.current_columns], -1, 0)
+        return means
+
+    def _sailed(self, x: Floats) -> tuple[Floats, Floats]:
+        """Surge and sway through the water, shape (n_times, n_rows, n_trials)."""
+        deviations = x[:, :N_COEFFICIENTS]
+        c = (MEAN + deviations * DEVIATION).T[:, :, None]
+        u, v = np.moveaxis(x[:, self.start_columns], -1, 0)
+        u = u + SurgeSwayInputs(*self.runs.inputs[0]).n
         surge, sway = [u], [v]
         for now, then in pairwise(self.runs.inputs):
             u, v = _midpoint_step(
@@ -154,80 +164,38 @@ class _Problem:
             )
             surge.append(u)
             sway.append(v)
-
-        ahead = np.array(surge)
-        aside = np.array(sway)
-        heading = self.runs.psi[:, None]
-        north, east = rotate_to_body(ahead, aside, -heading)
-        velocities = np.stack([north, east, ahead], axis=1)
-        return window_means(velocities)
-
-    def _starts_by_lane(self, x: Floats, n_lanes: int) -> tuple[Floats, Floats]:
-        """Starting u and v, shape (n_lanes, n_trials), each moved in its own lane."""
-        at_start = SurgeSwayInputs(*self.runs.inputs[0])
-        u, v = x[self.start_columns].T
-        u = u + at_start.n
-        u = np.tile(u, (n_lanes, 1))
-        v = np.tile(v, (n_lanes, 1))
-        u[-2] += DIFFERENCE
-        v[-1] += DIFFERENCE
-        return u, v
+        return np.array(surge), np.array(sway)
 
     def errors(self, x: Floats) -> tuple[Floats, Floats]:
         """Measured less simulated velocities, and slopes of the latter by the unknowns.
 
-        Shapes (n_windows, 3, n_trials) and (n_windows, 3, n_trials, n_unknowns): north,
-        east, and ahead through the water; 0 where nothing was measured.
+        Shapes (n_windows, 3, n_trials) and (n_windows, 3, n_trials, n_unknowns); 0
+        where nothing was measured.
         """
-        simulated = self.simulated(x)
-        lanes = np.moveaxis(simulated, 2, -1)
-        predicted = lanes[..., 0].copy()
-        predicted[:, :2] += x[self.current_columns].T
-        errors = self.runs.seen - predicted
-        slopes = self._slopes(lanes)
-
+        rows = np.vstack([x, x + DIFFERENCE * np.eye(len(x))])
+        means = np.moveaxis(self.simulated(rows), 2, -1)
+        as_given, moved = means[..., :1], means[..., 1:]
+        errors = self.runs.seen - as_given[..., 0]
+        slopes = (moved - as_given) / DIFFERENCE
         is_missing = np.isnan(self.runs.seen)
         errors[is_missing] = 0.0
         slopes[is_missing] = 0.0
         return errors, slopes
-
-    def _slopes(self, lanes: Floats) -> Floats:
-        """Slopes of velocities by the unknowns, from simulated lanes as last axis."""
-        as_given = lanes[..., :1]
-        moved = lanes[..., 1:]
-        by_unknown = (moved - as_given) / DIFFERENCE
-        by_coefficient = by_unknown[..., :N_COEFFICIENTS]
-        by_start = by_unknown[..., N_COEFFICIENTS:]
-
-        *shape, _ = lanes.shape
-        n_unknowns = len(self.weights)
-        slopes = np.zeros((*shape, n_unknowns))
-        slopes[..., :N_COEFFICIENTS] = by_coefficient
-        for k in range(self.runs.n_trials):
-            own_start = self.start_columns[k]
-            slopes[:, :, k, own_start] = by_start[:, :, k]
-            north, east = self.current_columns[k]
-            slopes[:, 0, k, north] = 1.0
-            slopes[:, 1, k, east] = 1.0
-        return slopes
 
     def fitted(self) -> _Fit:
         """Fit by Levenberg & Marquardt; each round renews the residuals' scale."""
         x, scale = np.zeros(len(self.weights)), 0.1
         for _ in range(3):
 
-            def residuals(x: Floats, scale: float = scale) -> Floats:
-                errors, _ = self.errors(x)
-                return np.append(errors.ravel() / scale, self.weights * x)
-
-            def jacobian(x: Floats, scale: float = scale) -> Floats:
-                _, slopes = self.errors(x)
+            def linearised(x: Floats, scale: float = scale) -> Linearised:
+                errors, slopes = self.errors(x)
                 of_data = -slopes.reshape(-1, len(x)) / scale
-                return np.vstack([of_data, np.diag(self.weights)])
+                return Linearised(
+                    np.append(errors.ravel() / scale, self.weights * x),
+                    np.vstack([of_data, np.diag(self.weights)]),
+                )
 
-            x = least_squares(
-                residuals, x, jacobian, ftol=1e-3, xtol=1e-6, max_nfev=10
-            ).x
+            x = fit_least_squares(linearised, x, ftol=1e-3, xtol=1e-6, max_nfev=10).x
             errors, slopes = self.errors(x)
             scale = self._scale(errors)
         return _Fit(x, slopes / scale, errors / scale)
@@ -243,17 +211,6 @@ class _Problem:
         J = slopes.reshape(-1, len(self.weights))
         of_prior = np.diag(self.weights**2)
         return J.T @ J + of_prior
-
-
-def _coefficients_by_lane(deviations: Floats) -> Floats:
-    """Coefficients of the lanes of `_Problem.simulated`, shape (18, n_lanes, 1).
-
-    From deviations of the prior, shape (18,).
-    """
-    n_lanes = 1 + N_COEFFICIENTS + 2  # those given; each one moved; two starts moved
-    values = np.tile(MEAN + deviations * DEVIATION, (n_lanes, 1))
-    values[1:-2] += DIFFERENCE * np.diag(DEVIATION)
-    return values.T[:, :, None]
 
 
 def _midpoint_step(

@@ -1,9 +1,10 @@
 """Gaps in the time of a record, across which nothing is smoothed or integrated."""
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.ndimage import median_filter
 
-from identification.arrays import stretches
 from shipgym import InputError, Particulars, Trial
 from shipgym.arrays import Flags, Floats
 
@@ -26,7 +27,8 @@ def between_gaps(
         return [trial]
 
     fewest = max(fewest, FEWEST_SAMPLES)
-    pieces = stretches(is_gap, fewest)
+    edges = [0, *(np.flatnonzero(is_gap) + 1).tolist(), len(trial)]
+    pieces = [slice(*pair) for pair in pairwise(edges) if pair[1] - pair[0] >= fewest]
     if not pieces:
         longest = int(np.argmax(np.diff(trial.t)))
         begin, end = trial.t[longest : longest + 2]

@@ -1,8 +1,10 @@
 """The problem to be identified: trials, structure, ship, and their regression."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
 
 from identification.samples.samples import Samples, build_samples
 from shipgym import InputError, ShipModel, Trial
@@ -22,7 +24,6 @@ class Problem:
     #: correlations of the candidates for the reference ship of a grey box, where it was
     #: chosen among several
     similarity: dict[str, float]
-    sea: dict[str, Any]  # what is known of current and wind, for the provenance
     sampling: dict[str, Any]  # keywords of `build_samples`
 
     def rows_of(self, table: Structure, ship: ShipModel) -> Samples:
@@ -33,6 +34,15 @@ class Problem:
             particulars=ship.particulars,
             shaft_speed=ship.service_shaft_speed,
             **self.sampling,
+        )
+
+    def without(self, trials: Sequence[int]) -> Self:
+        """The problem of the other trials, by their places."""
+        others = np.setdiff1d(range(len(self.used)), trials)
+        return replace(
+            self,
+            samples=self.samples.select(np.isin(self.samples.trial, others)),
+            used=tuple(self.used[place] for place in others),
         )
 
 
@@ -57,7 +67,11 @@ def held_out(trials: Any, names: str | Sequence[str]) -> Sequence[Trial]:
         )
     wanted = [names] if isinstance(names, str) else list(names)
     for name in wanted:
-        check_choice(name, known, "hold_out")
+        check_choice(
+            name,
+            known,
+            "hold_out",
+        )
 
     return [
         trial.with_(use="validate") if trial.name in wanted else trial

@@ -47,7 +47,12 @@ def trials_on_one_grid(trials: Sequence[Trial], length: float, speed: float) -> 
 
     inputs, headings, seen = [], [], []
     for trial, t in zip(trials, times, strict=True):
-        moved_by = _inputs(trial, travel_time, speed, shaft_speed)
+        moved_by = _inputs(
+            trial,
+            travel_time,
+            speed,
+            shaft_speed,
+        )
         inputs.append(_on_grid(grid, t, moved_by))
         headings.append(np.interp(grid, t, trial["psi"]))
         velocities = _on_grid(grid, t, _seen(trial, speed))

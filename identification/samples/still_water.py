@@ -53,8 +53,6 @@ def in_still_water(
     current in columns is taken out of the track. `current` and `wind` are those of
     `Options`.
     """
-    check_current(current)
-    check_wind(wind)
     is_usual_wind = isinstance(wind, str) and wind in ("auto", "none")
     feels_sea = any(_feels_sea(trial) for trial in trials)
     in_still = is_usual_wind and not feels_sea

@@ -73,6 +73,13 @@ def accelerations(
     )
     *others, wind = coefficients
     own, aside_own = others[: len(surge)], others[len(surge) :]
-    along = sum(c * term for c, term in zip(own, surge, strict=True))
+    along = sum(
+        c * term
+        for c, term in zip(
+            own,
+            surge,
+            strict=True,
+        )
+    )
     across = sum(c * term for c, term in zip(aside_own, sway, strict=True))
     return along + wind * ahead, across + wind * aside

@@ -242,7 +242,7 @@ def test_a_wrong_table_of_terms_is_named(ship, line, other, said, tmp_path):
     assert said in answer.stderr
 
 
-def test_advise_tells_information_and_what_to_run_next(demo):
+def test_advise_tells_what_to_run_next(demo):
     answer = shipgym(
         "advise", demo, "--coefficient", "N_vvv", "--number", "1", "--json"
     )
@@ -253,8 +253,6 @@ def test_advise_tells_information_and_what_to_run_next(demo):
     errors = told["relative_errors"]
     shrunk = errors["now"]["N_vvv"] / errors["expected"]["N_vvv"]
     assert shrunk == pytest.approx(max(gains.values()))
-    information = told["information"]
-    assert information["zigzag_35_30_port.csv"] > information["zigzag_10_10.csv"] > 0.0
     table = shipgym("advise", demo, "--coefficient", "N_vvv", "--number", "1").stdout
     assert f"run next: {told['run_next'][0]}" in table
     assert shipgym("advise", demo, "--coefficient", "N_vv").exit_code == 2

@@ -215,7 +215,7 @@ def fitted() -> tuple[ShipModel, IdentificationResult]:
     arguments: dict[str, Any] = {
         "particulars": L7,
         "steering": ship.steering,
-        "reference_model": "kvlcc2-l7",
+        "prior": "kvlcc2-l7",
     }
     return ship, identify([*trials, turn], "mmg", **arguments)
 
@@ -279,12 +279,9 @@ def turn_lengths(model: ShipModel) -> tuple[float, float]:
     [
         ({"method": "ls"}, r"method: .*'mmg'.*'ls'"),
         ({"method": TruncatedLSSVM(rank=3)}, r"method: .*'mmg'.*'tls-svm'"),
+        ({"reference_model": "kvlcc2"}, r"reference_model: .*'mmg'.*'kvlcc2'"),
         (
-            {"prior": "yoshimura", "reference_model": "auto"},
-            r"reference_model: .*'auto' and prior 'yoshimura'",
-        ),
-        (
-            {"reference_model": "mariner"},
+            {"prior": "mariner"},
             r"expected a ship in the MMG form, .* got 'mariner'",
         ),
         ({"prior": "clarke"}, r"'clarke'"),

@@ -205,7 +205,7 @@ def test_least_squares_and_ls_svm_agree_where_there_is_no_noise(
 def test_provenance_and_settings_tell_how_a_model_was_made(
     cao_zigzag: Trial, mariner: ShipModel
 ) -> None:
-    given = LSSVM(C=1e5, robust=True)
+    given = LSSVM(C=1e5)
     fit = identify(
         [cao_zigzag],
         "nomoto",

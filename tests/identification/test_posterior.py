@@ -9,6 +9,7 @@ import pytest
 
 from identification import Uncertainty, identify
 from identification.judging.posterior import with_posterior
+from identification.judging.sampling import mixing_of
 from identification.judging.warnings import model_warnings
 from identification.models.sailed import CoefficientPrior
 from shipgym import InputError, Particulars, Sensors, ShipModel, SteeringGear, Trial
@@ -64,7 +65,7 @@ def test_the_truth_lies_in_the_posterior_of_a_first_order_ship(nomoto, result):
     report = result.metrics["posterior"]
     assert report["kept"]
     assert 0.0 < report["power"] <= 1.0
-    assert report["r_hat"] < 1.2
+    assert report["effective_samples"] > 150.0
     assert len(model.draws) == 256
     assert "effective samples" in result.summary()
     assert not [text for text in model_warnings(result) if "posterior" in text]
@@ -92,20 +93,18 @@ def test_draws_of_a_posterior_are_sampled_saved_and_of_a_seed(
     np.testing.assert_array_equal(again.draws, model.draws)
 
 
-def test_trials_too_few_or_too_alike_are_refused(nomoto, trials):
+def test_too_few_trials_are_refused(nomoto, trials):
     with pytest.raises(InputError, match="at least 3 trials to fit for a posterior"):
         identified(nomoto, trials[:2])
-    copies = [trials[0].with_(name=f"copy {k}") for k in range(3)]
-    with pytest.raises(InputError, match=r"which differ in kind.* got 3 alike"):
-        identified(nomoto, copies)
 
 
-def test_walkers_that_do_not_mix_leave_the_covariance(nomoto, trials):
-    found = identified(nomoto, trials, steps=20)
-    assert found.model.draws is None
-    assert found.model.covariance is not None
-    (warning,) = [text for text in model_warnings(found) if "posterior" in text]
-    assert "the covariance is kept: try uncertainty.steps =" in warning
+def test_walkers_that_do_not_mix_leave_the_covariance():
+    rng = np.random.default_rng(0)
+    moving = rng.standard_normal((100, 128, 2))
+    assert mixing_of(moving).is_enough
+    stuck = np.tile(moving[0], (100, 1, 1))
+    assert not mixing_of(stuck).is_enough
+    assert not mixing_of(moving + np.linspace(0.0, 3.0, 100)[:, None, None]).is_enough
 
 
 def test_a_prior_that_trials_contradict_is_named(result, trials):

@@ -76,9 +76,9 @@ def test_settings_are_those_of_the_method_that_is_named() -> None:
     usual = read({"rank": 12, "C": np.inf})["method"]
     assert isinstance(usual, TruncatedLSSVM)
     assert (usual.rank, usual.C) == (12, np.inf)
-    named = read({"method": "ls-svm", "robust": True, "method.C": 3.0})["method"]
+    named = read({"method": "ls-svm", "scale": False, "method.C": 3.0})["method"]
     assert isinstance(named, LSSVM)
-    assert (named.robust, named.C) == (True, 3.0)
+    assert (named.scale, named.C) == (False, 3.0)
     table = {"name": "output-error", "pull": 0.1, "rank": 3}
     refined = read({"method": table})["method"]
     assert isinstance(refined, Refinement)

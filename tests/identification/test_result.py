@@ -102,7 +102,7 @@ def test_figures_by_name(
     truncated: IdentificationResult, searched: IdentificationResult
 ) -> None:
     held = f"prediction: {truncated.trials[-1].name}"
-    common = {"residuals", "trials", held}
+    common = {"trials", held}
     assert plots(truncated).keys() == common | {"l-curve"}
     assert plots(searched).keys() == common
 
@@ -116,7 +116,7 @@ def test_the_report_shows_trials_coefficients_and_figures(
         assert f"<td>{name}</td><td>{fixed(1e5 * value, 1)}</td>" in page
     for trial in truncated.trials:
         assert trial.raw.sha256[:16] in page
-    figures = ("residuals-figure", "l-curve-figure", "fitted-trials", "prediction-0")
+    figures = ("l-curve-figure", "fitted-trials", "prediction-0")
     for figure in figures:
         assert f'id="{figure}"' in page
 
@@ -129,7 +129,7 @@ def test_the_report_of_an_unstable_model_shows_no_coefficient(
     page = report_page(lost)
     assert "runs away on 1 of the recorded trials" in page
     assert "It must not be used." in page
-    assert 'id="residuals-figure"' in page
+    assert 'id="l-curve-figure"' in page
     assert "<td>X_u</td>" not in page
 
 
@@ -139,7 +139,6 @@ def test_a_notebook_shows_a_card_and_frames(truncated: IdentificationResult) -> 
     assert held_out_error(truncated) in card
     frame = truncated.to_frame()
     assert frame["value"].to_dict() == truncated.coefficients
-    assert "<td>" in truncated._repr_html_()
     uses = [trial.use for trial in truncated.trials]
     assert truncated.trials_frame()["use"].tolist() == uses
 

@@ -57,7 +57,6 @@ def test_the_structure_that_predicts_best_is_taken_and_the_ranking_told(
     assert {"nomoto", "steering7", "abkowitz"} <= structures
     of_yaw = next(row for row in told["ranking"] if row["structure"] == "norrbin")
     assert of_yaw["scales"]["u"] > 3.0 * best["scales"]["u"]  # it cannot say the speed
-    assert told["ranking"][0]["losses"].keys() == {"zigzag 0", "zigzag 1"}
     assert "channel 'n' is missing" in told["refused"]["cubic by tls-svm"]
     assert result.model.provenance is not None
     assert result.model.provenance["selection"] == told
@@ -79,9 +78,6 @@ def test_a_single_trial_is_cut_into_thirds(auto: Auto, trials: list[Trial]) -> N
     result = auto(trials[1:2])
     told = result.metrics["selection"]
     assert told["held_out"] == "each third of the only trial"
-    assert list(told["ranking"][0]["losses"]) == [
-        f"zigzag 1, part {k}" for k in (1, 2, 3)
-    ]
     assert result.trials == (trials[1],)
 
 

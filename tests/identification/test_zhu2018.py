@@ -59,7 +59,7 @@ def test_the_order_of_the_recursions_is_that_of_euler_s_rule():
     assert abs(accurate[a22]) < abs(accurate_started[a22])
 
 
-def test_outliers_bias_least_squares_and_ls_svr_alike_and_the_weighted_form_little():
+def test_outliers_bias_least_squares_and_ls_svr_alike_and_output_error_little():
     errors = {
         method: response_models.mean_error(
             response_models.fitted(method, "linear"), "K"

@@ -86,8 +86,8 @@ CONCLUSIONS = (
         lambda k_ls, k, t_ls, t: (
             k.as_paper < 0.9 * k_ls.as_paper and t.as_paper < 0.9 * t_ls.as_paper
         ),
-        "more robust: by a tenth of the error; both have a squared loss. The weighted"
-        " LS-SVM (at best) is",
+        "more robust: by a tenth of the error; both have a squared loss. Output error"
+        " after repair (at best) is",
     ),
     Conclusion(
         "A start by LS-SVR makes RLS more accurate and steadier (ship integrated by"

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from identification import Preprocessing, Sampling
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.tuned import TunedLSSVM
+from identification.models.refinement import whole_trials
 from identification.pipeline import identify
 from papers.row import Row, within
 from shipgym.manoeuvres import zigzag
@@ -117,11 +118,11 @@ def as_printed(trial: Trial, method: str, form: str) -> Form:
 
 
 def at_best(trial: Trial, form: str) -> Form:
-    """A form by weighted LS-SVM after repair, with the rudder between samples."""
+    """A form by output error after repair, with the rudder between samples."""
     model = identify(
         [trial],
         "nomoto" if form == "linear" else "norrbin",
-        LSSVM(robust=True),
+        whole_trials(),
         Sampling(window=WINDOW),
         particulars=ship().particulars,
         steering=ship().steering,
