@@ -78,5 +78,9 @@ def _allowed_growth(full: int, freedom: int) -> Floats:
     """Growth of the squared residuals that chance explains, of each rank (F test)."""
     significance = 0.1
     dropped = np.arange(full)[::-1]
-    quantile = fdtri(np.maximum(dropped, 1), freedom, 1.0 - significance)
+    quantile = fdtri(
+        np.maximum(dropped, 1),
+        freedom,
+        1.0 - significance,
+    )
     return np.asarray(1.0 + dropped / freedom * quantile)

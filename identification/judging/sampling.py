@@ -86,7 +86,10 @@ def autoregression(points: Floats) -> Any:
 def mixing_of(points: Floats) -> Mixing:
     """Diagnostics of points, shape (n_steps, n_walkers, n_parameters)."""
     n_steps, n_walkers, _ = points.shape
-    variance = np.maximum(points.var(axis=(0, 1)), np.finfo(float).tiny)
+    variance = np.maximum(
+        points.var(axis=(0, 1)),
+        np.finfo(float).tiny,
+    )
     of_means = points.mean(axis=0).var(axis=0, ddof=1)
     half = n_steps // 2
     drift = points[half:].mean(axis=(0, 1)) - points[:half].mean(axis=(0, 1))

@@ -61,7 +61,12 @@ class RegressionFit:
             estimators, _ = without_trials(self.fit.estimators, samples, trials)
             return with_coefficients(self.fit.model, estimators)
         others = self.problem.without(trials)
-        return _refined(self.fit, others, self.method, rounds=1).model
+        return _refined(
+            self.fit,
+            others,
+            self.method,
+            rounds=1,
+        ).model
 
     def result(self, options: Options) -> IdentificationResult:
         """The model with provenance, uncertainty and predictions of all trials."""

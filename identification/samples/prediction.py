@@ -144,7 +144,10 @@ class _Start:
         self.model = model
         self.trial = opening.trial
         self.spreads = np.array([max(opening.inexact[name], 1e-9) for name in names])
-        least = _least_errors(model, opening.measured)
+        least = _least_errors(
+            model,
+            opening.measured,
+        )
         #: errors that count as one at least
         self.floors = np.array(list(least.values()))
         self.measured = np.column_stack([self.trial[name] for name in least])

@@ -86,7 +86,11 @@ def _seen(trial: Trial, speed: float) -> tuple[Floats, Floats, Floats]:
     """Velocity north and east over ground, and ahead through the water if logged."""
     ahead, aside = over_ground(trial)
     to_earth = -trial["psi"]
-    north, east = rotate_to_body(ahead, aside, to_earth)
+    north, east = rotate_to_body(
+        ahead,
+        aside,
+        to_earth,
+    )
     logged = np.full(len(trial), np.nan)
     if "v" in trial.derived and "u" not in trial.derived:
         logged = trial["u"]

@@ -269,7 +269,10 @@ class _Regression:
         structure = self.structure
         motion = (channels, self.particulars, self.shaft_speed)
         terms = {q: structure.features(q, *motion) for q in structure.equations}
-        if isinstance(structure, GreyBox):
+        if isinstance(
+            structure,
+            GreyBox,
+        ):
             known = self._bare_reference.rates(channels)
             terms = {q: np.column_stack([own, known[q]]) for q, own in terms.items()}
         return terms
