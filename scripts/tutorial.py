@@ -56,7 +56,7 @@ BLOCK = re.compile(
 #: What is shown of the output of commands that print much: so many lines from one that
 #: begins so.
 SHOWN = {
-    "look": {"": 8, "written": 1},
+    "look": {"": 5, "written": 1},
     "identify": {"": 7, "circle_35.csv, ": 1, "Open-loop": 12, "Worst": 1},
     "trials": {"Manoeuvres": 6, "IMO": 16},
     "autopilot": {"unstable draws": 1, "Autopilots": 5, "report": 1},

@@ -51,18 +51,14 @@ class Cell:
         each of shape (n_runs, n_episodes).
     failures : mapping of str to str
         By set of episodes, how the controller failed first, if it did.
-    seconds_per_action : float
-        Processor time of a command, mean over the runs.
-    ship_steps, seconds : float
-        What making a run took: steps of simulated ships, and processor time.
+    ship_steps : float
+        Steps of simulated ships that making a run took.
     """
 
     refused: str = ""
     figures: Mapping[str, Figures] = field(default_factory=dict)
     failures: Mapping[str, str] = field(default_factory=dict)
-    seconds_per_action: float = np.nan
     ship_steps: float = 0.0
-    seconds: float = 0.0
 
     def table(self, controller: str, task: str, options: Options) -> pd.DataFrame:
         """Return a row for each set, run and episode, with its seed."""
@@ -103,7 +99,6 @@ def run_cell(entry: Entry, task: BenchmarkTask, options: Options) -> Cell:
 
     figures: dict[str, Figures] = {}
     failures: dict[str, str] = {}
-    seconds = []
     for on in task.sets:
         seeds = judging_seeds(on, options.episodes, options.seed)
         sailed = [evaluate(policy, task, seeds, on) for policy in made.policies]
@@ -111,15 +106,12 @@ def run_cell(entry: Entry, task: BenchmarkTask, options: Options) -> Cell:
         for name in sailed[0][0]:
             figures[on][name] = np.stack([found[name] for found, _ in sailed])
         for _, run in sailed:
-            seconds.append(run.seconds_per_action)
             if run.failure:
                 failures.setdefault(on, run.failure)
     return Cell(
         figures=figures,
         failures=failures,
-        seconds_per_action=float(np.mean(seconds)),
         ship_steps=made.ship_steps,
-        seconds=made.seconds,
     )
 
 

@@ -20,8 +20,7 @@ Runs are the unit: what searches or learns is made several times. A function tha
 import glob
 import hashlib
 import inspect
-import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
@@ -64,13 +63,10 @@ class Made(NamedTuple):
     policies : list of Policy
     ship_steps : float
         Control intervals that ships were simulated for, mean over the runs.
-    seconds : float
-        Processor time, mean over the runs.
     """
 
     policies: list[Policy]
     ship_steps: float
-    seconds: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +77,9 @@ class Entry:
     ----------
     name : str
         Its name in tables and files.
-    source : str, controller, callable or sequence
-        A text as in the module's docstring, a controller, a function that returns one
-        for a `BenchmarkTask`, or several of the latter two, each a run.
+    source : str, controller or callable
+        A text as in the module's docstring, a controller, or a function that returns
+        one for a `BenchmarkTask`.
     """
 
     name: str
@@ -108,15 +104,13 @@ class Entry:
         """
         where = f"'{self.name}' on task '{task.name}'"
         given = task.design_task
-        before, began = Engine.ship_steps, time.process_time()
+        before = Engine.ship_steps
         policies = _policies(self.source, given, runs)
         steps = (Engine.ship_steps - before) / len(policies)
-        seconds = (time.process_time() - began) / len(policies)
         if self.is_text and self.source.startswith(TUNED):
             kind = _kind(self.source.removeprefix(TUNED), given)
             found = tuned_runs(kind, given, given.suite)
             steps = float(np.mean([run.get("ship_steps", 0) for run in found]))
-            seconds = float(np.mean([run.get("seconds", 0.0) for run in found]))
         if steps > budget:
             raise InputError(
                 f"{where}: expected at most {budget:,.0f} ship steps in making a run,"
@@ -130,7 +124,7 @@ class Entry:
                     f"{where}: expected a design on the model '{task.model}', got one"
                     f" on the ship '{task.true_ship}'"
                 )
-        return Made(policies, steps, seconds)
+        return Made(policies, steps)
 
     def fingerprint(self, task: BenchmarkTask) -> dict[str, str]:
         """Return the SHA-256 of each file that it is made from for a task, by path."""
@@ -187,8 +181,7 @@ def read_entries(controllers: Any) -> tuple[Entry, ...]:
         if isinstance(source, str):
             _check_text(source)
         else:
-            for one in source if isinstance(source, Sequence) else [source]:
-                _check_object(one, name)
+            _check_object(source, name)
         entries[name] = Entry(name, source)
     if not entries:
         raise InputError("controllers: expected at least one, got none")
@@ -261,8 +254,7 @@ def _check_object(source: Any, name: str) -> None:
 def _policies(source: Any, task: BenchmarkTask, runs: int) -> list[Policy]:
     """Make the controllers of a source for a design task."""
     if not isinstance(source, str):
-        given = source if isinstance(source, Sequence) else [source]
-        return [policy for one in given for policy in _runs(one, task, runs)]
+        return _runs(source, task, runs)
     if names_code(source):
         return _runs(_imported(source), task, runs)
     if source == RULE:

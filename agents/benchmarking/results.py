@@ -219,7 +219,6 @@ def collect(
         about_tasks[task.name] = {
             **task.to_dict(),
             "model_sha256": model_hash(task.ship),
-            "gap": computed.gap(task.name, by_task),
         }
     source = Path(suite.source)
     summary = {
@@ -283,7 +282,6 @@ def _about_entry(
         "files": files,
         "refused": {name: cell.refused for name, cell in own.items() if cell.refused},
         "ship_steps": float(np.mean([cell.ship_steps for cell in made] or [0.0])),
-        "seconds": float(np.mean([cell.seconds for cell in made] or [0.0])),
     }
 
 

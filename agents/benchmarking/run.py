@@ -46,7 +46,7 @@ def benchmark(
     controllers : str, sequence, or mapping of str
         What is compared: texts such as ``"pid,lq"`` (`agents.benchmarking.entries`),
         controllers, functions of a `BenchmarkTask` that return one; or any of these by
-        name, a list being the runs of one controller.
+        name.
     suite : str or Path
         Name of a shipped suite, or the TOML file of your own.
     tasks : str or sequence of str, optional

@@ -8,8 +8,8 @@ with replacement. All controllers get the same draws of episodes, because they a
 the same ones: differences are paired. Equal costs are drawn alike.
 
 Sources: Agarwal, Schwarzer, Castro, Courville & Bellemare 2021, Deep Reinforcement
-Learning at the Edge of the Statistical Precipice, NeurIPS 34 (stratified bootstrap,
-probability of improvement); Efron & Tibshirani 1993, An Introduction to the Bootstrap,
+Learning at the Edge of the Statistical Precipice, NeurIPS 34 (stratified bootstrap);
+Efron & Tibshirani 1993, An Introduction to the Bootstrap,
 chapters 13 (percentile interval) and 8 (more than one source of chance); Fleming &
 Wallace 1986, How Not to Lie with Statistics, CACM 29 (ratios are averaged by their
 geometric mean).
@@ -100,27 +100,6 @@ def mean_score(
     if not scores:
         return interval(np.nan, np.zeros(0))
     return interval(float(geometric_mean(scores)), geometric_mean(drawn_scores))
-
-
-def improvement(
-    costs: Mapping[str, Floats], rule_costs: Mapping[str, Floats], draws: Draws
-) -> Interval:
-    """Probability that a run costs less than one of the rule in the same episode.
-
-    Ties count half; the mean over tasks. Parameters are those of `mean_score`.
-    """
-    shares = []
-    drawn_shares = []
-    for task in sorted(costs.keys() & rule_costs.keys()):
-        cost = costs[task][:, None]
-        rule_cost = rule_costs[task]
-        wins = (cost < rule_cost) + 0.5 * (cost == rule_cost)
-        by_run = wins.mean(axis=1)
-        shares.append(by_run.mean())
-        drawn_shares.append(draws.means(by_run, task))
-    if not shares:
-        return interval(np.nan, np.zeros(0))
-    return interval(float(np.mean(shares)), np.mean(drawn_shares, axis=0))
 
 
 def geometric_mean(values: ArrayLike) -> Floats:

@@ -13,7 +13,6 @@ from agents.benchmarking.cells import Cells, Options
 from agents.benchmarking.statistics import (
     Draws,
     geometric_mean,
-    improvement,
     mean_cost,
     mean_score,
 )
@@ -113,22 +112,8 @@ class Summary:
             "failed": int(figures["failed"].sum()),
             "failure": cell.failures.get(on, ""),
             "exceeded": exceeded(task.limits, means),
-            "microseconds_per_action": finite(1e6 * cell.seconds_per_action),
             "metrics": means,
         }
-
-    def gap(self, task: str, by_task: ByTask) -> float | None:
-        """Median over controllers of the cost on the ship by that on the model, less 1.
-
-        None of a task without a model. Both signs count as differences.
-        """
-        sets = by_task[task]
-        ratios = [
-            cell["cost"]["value"] / sets["model"][name]["cost"]["value"] - 1.0
-            for name, cell in sets["ship"].items()
-            if "model" in sets
-        ]
-        return float(np.median(ratios)) if ratios else None
 
     def rankings(self, by_task: ByTask) -> dict[str, list[dict[str, Any]]]:
         """Return the totals of the controllers by part of the suite, the best first.
@@ -170,8 +155,7 @@ class Summary:
             mine, rules = self.costs(name, on, part), self.costs("", on, part)
             if mine:
                 scores[on] = mean_score(mine, rules, self.draws)
-        better = improvement(costs, self.costs("", "ship", part), self.draws)
-        return {**total, "scores": scores, "improvement": better}
+        return {**total, "scores": scores}
 
 
 def _metrics(episodes: pd.DataFrame) -> dict[tuple[str, ...], dict[str, Any]]:

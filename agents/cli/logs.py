@@ -170,13 +170,14 @@ def _entry(
     guess: TrialGuess, shared: list[ColumnGuess], folder: Path
 ) -> dict[str, Any]:
     """A log for the template of the ship file."""
+    declared = {one.declaration for one in shared}
     of_trial = []
     for one in guess.decisions:
         if one.section == "trials":
             of_trial.append(one.choices)
     return {
         "file": _toml_paths(guess.paths, folder),
-        "columns": [one for one in guess.columns if one not in shared],
+        "columns": [one for one in guess.columns if one.declaration not in declared],
         "manoeuvres": _manoeuvres(guess),
         "decision": next(iter(of_trial), None),
     }

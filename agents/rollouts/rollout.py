@@ -1,6 +1,5 @@
 """The loop in which a policy steers ships through episodes of a task, side by side."""
 
-import time
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
@@ -40,8 +39,6 @@ class Rollout:
         command.
     failure : str
         How the policy failed first; empty if it did not.
-    seconds_per_action : float
-        Process time of `predict` over the number of commands it gave, in a batch.
     histories : dict of str to array of shape (n_steps + 1, n)
         Physical states and entries of `info` that were recorded, from the beginning on.
     """
@@ -54,7 +51,6 @@ class Rollout:
     terminated: Flags
     failed: Flags
     failure: str
-    seconds_per_action: float
     histories: Histories
 
     @property
@@ -123,7 +119,6 @@ def rollout(
         terminated=ended,
         failed=failed,
         failure=helmsman.failure,
-        seconds_per_action=helmsman.seconds / max(helmsman.n_commands, 1),
         histories={name: np.array([one[name] for one in looks]) for name in looks[0]},
     )
 
@@ -156,9 +151,7 @@ class _Helmsman:
         self.tolerant = tolerant
         self.memory: Any = None
         self.failure = ""
-        self.seconds = 0.0
         self.n_calls = 0
-        self.n_commands = 0
 
     def steer(
         self, seen: Any, starts: Flags, sailing: Flags, n_commands: int
@@ -170,18 +163,15 @@ class _Helmsman:
         """
         where = f"step {self.n_calls}"
         self.n_calls += 1
-        self.n_commands += int(sailing.sum())
         values = np.zeros((len(sailing), n_commands), dtype=np.float32)
         missing = sailing
         fault = ""
-        began = time.process_time()
         try:
             actions, self.memory = self.policy.predict(seen, self.memory, starts, True)
         except Exception as error:  # whatever a user's policy raises
             if not self.tolerant:
                 raise
             fault = told(error)
-        self.seconds += time.process_time() - began
         if not fault:
             given, fault = _numbers(actions, values.shape)
             missing = sailing & ~np.isfinite(given).all(axis=1)

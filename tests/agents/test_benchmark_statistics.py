@@ -4,7 +4,6 @@ from scipy.stats import gmean
 
 from agents.benchmarking.statistics import (
     Draws,
-    improvement,
     mean_cost,
     mean_score,
 )
@@ -25,7 +24,6 @@ def test_intervals_of_every_statistic_are_those_of_theory():
     for found, error in (
         (mean_cost({"a": costs}, draws), sigma),
         (mean_score({"a": costs}, rule_costs, draws), sigma / 50.0),
-        (improvement({"a": costs}, rule_costs, draws), 0.5 / np.sqrt(1000)),
     ):
         assert found["low"] < found["value"] < found["high"]
         half = 0.5 * (found["high"] - found["low"])
@@ -58,16 +56,3 @@ def test_scores_are_paired_over_episodes():
     costs = RANDOM.uniform(10.0, 100.0, (1, 100))
     scored = mean_score({"a": costs}, {"a": 1.05 * costs}, Draws(100))
     assert values(scored) == pytest.approx([1.05] * 3)
-
-
-def test_probability_of_improvement_is_paired_and_ties_count_half():
-    def probability(costs, rule):
-        costs, rule = np.array(costs), np.array([rule])
-        draws = Draws(costs.shape[1])
-        return improvement({"a": costs}, {"a": rule}, draws)["value"]
-
-    one, other = [1.0, 2.0, 3.0, 4.0], [2.0, 2.0, 1.0, 9.0]
-    assert probability([one], other) == (1.0 + 0.5 + 0.0 + 1.0) / 4.0
-    assert probability([other], one) == 1.0 - probability([one], other)
-    # one training run wins, the other loses
-    assert probability([[0.0, 0.0], [5.0, 5.0]], [1.0, 1.0]) == 0.5

@@ -54,9 +54,18 @@ def test_a_ship_file_is_written_from_a_log_and_says_what_was_guessed(
     assert (code, "ship.toml: exists already" in said) == (2, True)
 
 
+def test_columns_that_all_logs_have_alike_are_declared_once(log, monkeypatch, capsys):
+    larger = (log / "log.csv").read_text().replace("10,0", "12,0")
+    (log / "other.csv").write_text(larger)
+    code, said = command(monkeypatch, capsys, "new-ship", "log.csv", "other.csv")
+    assert (code, "other.csv:" in said) == (0, False)
+    assert "[trials.columns]" not in (log / "ship.toml").read_text()
+
+
 def test_the_record_is_drawn_on_a_page(log, monkeypatch, capsys):
     code, said = command(monkeypatch, capsys, "look", "log.csv")
     assert (code, "log.csv: 300 samples over 299 s: psi, r, delta" in said) == (0, True)
+    assert "1 trial to identify a model from, with 1 remark." in said
     page = (log / "look.html").read_text()
     assert page.count("Plotly.newPlot(") == 1
     assert "The channels over time." in page
