@@ -66,7 +66,7 @@ def new_ship_command(
         {
             "written": str(out),
             "columns": {
-                one.channel: {"column": one.column, "unit": one.unit}
+                one.channel: {"column": one.name, "unit": one.unit}
                 for one in first.columns
             },
             "unused": first.unused,

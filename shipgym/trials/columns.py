@@ -1,5 +1,6 @@
 """Columns of a file by channel, their units, and the place of each value."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, SupportsIndex
@@ -34,6 +35,41 @@ class Column:
     quaternion: tuple[str, ...] | None = None  # columns of x, y and z, beside that of w
     file: str | None = None  # of several that are one log, where more have the column
 
+    @property
+    def extra(self) -> dict[str, Any]:
+        """What is declared of the column beside its name, its unit and its file."""
+        keys = ("date", "minus", "neutral", "full", "quaternion")
+        return {key: getattr(self, key) for key in keys if getattr(self, key)}
+
+    @property
+    def names(self) -> set[str]:
+        """Columns of the file that are read."""
+        others = (self.date, self.minus, *(self.quaternion or ()))
+        return {self.name, *filter(None, others)}
+
+    @property
+    def declaration(self) -> str:
+        """The column as a ship file declares it."""
+        values = {"column": self.name, "unit": self.unit, **self.extra}
+        parts = [
+            f"{key} = {json.dumps(value, ensure_ascii=False)}"
+            for key, value in values.items()
+        ]
+        return f"{{ {', '.join(parts)} }}"
+
+
+@dataclass(frozen=True)
+class ColumnGuess(Column):
+    """The column and unit of a channel, and why that unit."""
+
+    channel: str = ""
+    reason: str = "from its name"
+
+    @property
+    def is_named(self) -> bool:
+        """True if the column's name ends with the unit."""
+        return self.reason == "from its name"
+
 
 @dataclass(frozen=True)
 class Locator:
@@ -62,8 +98,8 @@ class Locator:
 
     def declaration(self, channel: str, unit: str) -> str:
         """Declaration of another unit: ``r = { column = "yaw", unit = "deg/s" }``."""
-        name = self.columns[channel].name
-        return f'{channel} = {{ column = "{name}", unit = "{unit}" }}'
+        column = Column(self.columns[channel].name, unit)
+        return f"{channel} = {column.declaration}"
 
 
 #: Keys of the column of a channel, beside those of each.

@@ -151,7 +151,7 @@ def test_a_unit_that_is_not_known_is_a_question(tmp_path, name, key, words):
 def test_a_name_alone_makes_no_channel(tmp_path, column, channel):
     columns = plain() | {column: 1.0 + 0.01 * T}
     guess = guessed(tmp_path, table(columns, *columns.values()))
-    assert channel not in {one.channel for one in guess.columns if one.column == column}
+    assert channel not in {one.channel for one in guess.columns if one.name == column}
 
 
 def test_a_heading_that_is_stuck_is_noted(tmp_path):

@@ -1,6 +1,7 @@
 """Columns, units, signs and frames of a log, guessed, each with its reason."""
 
-from shipgym.trials.guesses.columns import ColumnGuess, guess_columns
+from shipgym.trials.columns import ColumnGuess
+from shipgym.trials.guesses.columns import guess_columns
 from shipgym.trials.guesses.trials import (
     ConventionGuess,
     Decision,

@@ -1,18 +1,17 @@
 """Guesses of the column of a log that holds a channel, by its name."""
 
-import json
 import re
 from collections.abc import Collection, Iterable
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import cache, lru_cache
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 
 from shipgym.files import shipped_toml
 from shipgym.trials.column_values import without_sentinels
-from shipgym.trials.columns import Column
+from shipgym.trials.columns import ColumnGuess
 from shipgym.trials.guesses.steering import steering_command
 from shipgym.trials.guesses.units import (
     UNKNOWN,
@@ -57,43 +56,6 @@ _NO_MEASUREMENT = {
 _QUATERNIONS = ("wxyz", "0123", "1234")
 
 
-class ColumnGuess(NamedTuple):
-    """The column and unit of a channel, and why that unit."""
-
-    channel: str
-    column: str
-    unit: str
-    reason: str
-    #: other keys of the declaration
-    extra: tuple[tuple[str, str | float | tuple[str, ...]], ...] = ()
-
-    @property
-    def is_named(self) -> bool:
-        """True if the column's name ends with the unit."""
-        return UnitGuess(self.unit, self.reason).is_named
-
-    @property
-    def quoted(self) -> str:
-        """The name of the column as TOML has it."""
-        return json.dumps(self.column, ensure_ascii=False)
-
-    @property
-    def declaration(self) -> str:
-        """The column as the ship file declares it."""
-        keys = {"column": self.column, "unit": self.unit, **dict(self.extra)}
-        parts = [
-            f"{key} = {json.dumps(value, ensure_ascii=False)}"
-            for key, value in keys.items()
-        ]
-        return f"{{ {', '.join(parts)} }}"
-
-    @property
-    def as_column(self) -> Column:
-        """The column for the reader."""
-        keys = dict[str, object](self.extra)
-        return Column(self.column, self.unit, **keys)  # type: ignore[arg-type]
-
-
 @cache
 def _column_names() -> dict[str, dict[str, list[str]]]:
     """Names of columns by channel, as `fnmatch` patterns in the order of trial.
@@ -124,13 +86,13 @@ def guess_columns(table: LogTable) -> list[ColumnGuess]:
         found = _first_match(table, free, channel, known[patterns])
         if found is not None:
             guesses[channel] = found
-            free.remove(found.column)
+            free.remove(found.name)
 
     for channel in known:
         if channel == "n" and guesses.keys().isdisjoint(RUDDERS):
             command = steering_command(table, free)
             if command is not None:
-                guesses["delta"] = ColumnGuess("delta", *command)
+                guesses["delta"] = command
         is_speed_alone = channel == "v" and "u" not in guesses
         is_channel = channel in QUANTITIES and not is_speed_alone
         if is_channel:
@@ -169,9 +131,13 @@ def _quaternion(table: LogTable, free: list[str]) -> ColumnGuess | None:
         is_unit = np.abs(length[np.isfinite(length)] - 1.0) < 0.02
         moves = np.nanmax(np.nanstd(known, axis=1)) > 1e-6
         if moves and is_unit.mean() > 0.99:
-            reason = "of a quaternion, whose four columns have length 1"
-            extra = (("quaternion", tuple(names[1:])),)
-            return ColumnGuess("psi", names[0], "rad", reason, extra)
+            return ColumnGuess(
+                names[0],
+                "rad",
+                quaternion=tuple(names[1:]),
+                channel="psi",
+                reason="of a quaternion, whose four columns have length 1",
+            )
     return None
 
 
@@ -183,16 +149,16 @@ def _first_match(
     for column in free:
         unit = _unit_where_fitting(table, column, channel)
         if unit is not None and _may_be(table, column, channel):
-            fitting.append(ColumnGuess(channel, column, *unit))
+            fitting.append(ColumnGuess(column, channel=channel, **unit._asdict()))
     fitting.sort(key=lambda one: one.unit == UNKNOWN)
     for pattern in patterns:
         for guess in fitting:
-            forms = _forms(guess.column, channel)
+            forms = _forms(guess.name, channel)
             if _matches(forms, [pattern]):
                 return guess
     of_unit = _column_names()["with_unit"].get(channel, [])
     for guess in fitting:
-        forms = _forms(guess.column, channel)
+        forms = _forms(guess.name, channel)
         if guess.is_named and _matches(forms, of_unit):
             return guess
     return None
@@ -289,14 +255,14 @@ def _is_duration(
 
 def _with_date(table: LogTable, time: ColumnGuess, free: list[str]) -> ColumnGuess:
     """The time with the column of its date where there is one."""
-    if not _TIME_OF_DAY.fullmatch(table.first_text(time.column)):
+    if not _TIME_OF_DAY.fullmatch(table.first_text(time.name)):
         return time
     for pattern in _column_names()["known"]["date"]:
         for column in free:
             date = table.first_text(column)
             if _DATE.fullmatch(date) and _matches(_forms(column, "t"), [pattern]):
                 free.remove(column)
-                return time._replace(extra=(("date", column),))
+                return replace(time, date=column)
     return time
 
 

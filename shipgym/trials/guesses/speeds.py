@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
-from shipgym.trials.guesses.columns import ColumnGuess
+from shipgym.trials.columns import ColumnGuess
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.recording import read_recording
 from shipgym.trials.resampling import usual_step
@@ -26,12 +27,12 @@ def settle_speeds(
     known = _speed_by_positions(table, settled) if speeds else None
     is_si = any(guess.unit in ("rad", "rad/s") for guess in guesses.values())
     for guess in speeds:
-        values = table.likely_numbers(guess.column)
+        values = table.likely_numbers(guess.name)
         if values is None:
             continue
         sizes = np.abs(values)
         sway = settled.get("v") if guess.channel == "u" else None
-        across = None if sway is None else table.likely_numbers(sway.column)
+        across = None if sway is None else table.likely_numbers(sway.name)
         if across is not None:
             sizes = np.hypot(values, across)
         number = _middle(sizes[sizes < 100.0])
@@ -41,7 +42,7 @@ def settle_speeds(
             guess = _guessed(guess, float(np.nanmax(sizes, initial=0.0)), is_si=is_si)
         settled[guess.channel] = guess
         if sway is not None:
-            settled["v"] = sway._replace(unit=guess.unit, reason=guess.reason)
+            settled["v"] = replace(sway, unit=guess.unit, reason=guess.reason)
     return settled
 
 
@@ -63,7 +64,7 @@ def _speed_by_positions(
     for pair in (("lat", "lon"), ("x", "y")):
         if not {"t", *pair} <= guesses.keys():
             continue
-        columns = {name: guesses[name].as_column for name in ("t", *pair)}
+        columns = {name: guesses[name] for name in ("t", *pair)}
         try:
             signals = read_recording(table, columns, "interpolate").signals
         except InputError:
@@ -99,7 +100,7 @@ def _by_positions(
     )
     if is_named:
         reason += f", not {guess.unit} as its name or row of units says"
-    return guess._replace(unit=nearest, reason=reason)
+    return replace(guess, unit=nearest, reason=reason)
 
 
 def _guessed(guess: ColumnGuess, largest: float, *, is_si: bool) -> ColumnGuess:
@@ -110,4 +111,4 @@ def _guessed(guess: ColumnGuess, largest: float, *, is_si: bool) -> ColumnGuess:
         f"is a guess: there are no positions that tell, up to {largest:.4g}{beside};"
         " knots, m/s or km/h"
     )
-    return guess._replace(unit="m/s" if largest <= fastest else "knots", reason=reason)
+    return replace(guess, unit="m/s" if largest <= fastest else "knots", reason=reason)

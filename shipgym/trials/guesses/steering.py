@@ -1,11 +1,12 @@
 """Steering commands of boats without a rudder: two propellers, or a pulse width."""
 
 import re
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
 from shipgym.arrays import Floats
+from shipgym.trials.columns import ColumnGuess
 from shipgym.trials.readers.log_table import LogTable
 
 _PORT = {"left", "port", "l", "p", "bb", "backbord", "babord"}
@@ -25,16 +26,7 @@ _SERVO = re.compile(
 _NEUTRAL, _SPAN = 1500.0, 400.0  # us, of radio control's servos
 
 
-class Command(NamedTuple):
-    """Column of a steering command, as the declaration of a rudder has it."""
-
-    column: str
-    unit: str
-    reason: str
-    extra: tuple[tuple[str, str | float], ...]  # other keys of the declaration
-
-
-def steering_command(table: LogTable, free: list[str]) -> Command | None:
+def steering_command(table: LogTable, free: list[str]) -> ColumnGuess | None:
     """Steering command in columns of no other channel, which are then not free."""
     numbers = {}
     for column in free:
@@ -44,12 +36,11 @@ def steering_command(table: LogTable, free: list[str]) -> Command | None:
             numbers[column] = known
     command = _two_propellers(numbers) or _servo(numbers)
     if command is not None:
-        used = {command.column, dict(command.extra).get("minus")}
-        free[:] = [column for column in free if column not in used]
+        free[:] = [column for column in free if column not in command.names]
     return command
 
 
-def _two_propellers(numbers: dict[str, Floats]) -> Command | None:
+def _two_propellers(numbers: dict[str, Floats]) -> ColumnGuess | None:
     """Difference of the propellers of port and starboard."""
     by_rest: dict[str, dict[str, str]] = {}
     for column in numbers:
@@ -72,7 +63,7 @@ def _two_propellers(numbers: dict[str, Floats]) -> Command | None:
             f"steering command: '{first}' minus '{second}', of which {full:g} counts as"
             " 35 deg of a nominal rudder"
         )
-        return Command(first, "deg", reason, (("minus", second), ("full", full)))
+        return _command(first, reason, minus=second, full=full)
     return None
 
 
@@ -87,7 +78,7 @@ def _side(column: str) -> tuple[str, str]:
     return "", ""
 
 
-def _servo(numbers: dict[str, Floats]) -> Command | None:
+def _servo(numbers: dict[str, Floats]) -> ColumnGuess | None:
     """The first pulse width that a servo of radio control gets.
 
     ArduPilot's ``SteerOut`` is a command up to 4500.
@@ -95,16 +86,19 @@ def _servo(numbers: dict[str, Floats]) -> Command | None:
     for column in numbers:
         if re.fullmatch(r"(.*\.)?SteerOut", column):
             reason = "steering command of ArduPilot, of which 4500 is the full one"
-            return Command(column, "deg", reason, (("full", 4500.0),))
+            return _command(column, reason, full=4500.0)
     for column, values in numbers.items():
         if _SERVO.fullmatch(column) and _is_pulse_width(values):
             reason = (
                 f"steering command: a pulse width in us, neutral at {_NEUTRAL:g}, of"
                 f" which {_SPAN:g} counts as 35 deg of a nominal rudder"
             )
-            extra = (("neutral", _NEUTRAL), ("full", _SPAN))
-            return Command(column, "deg", reason, extra)
+            return _command(column, reason, neutral=_NEUTRAL, full=_SPAN)
     return None
+
+
+def _command(name: str, reason: str, **keys: Any) -> ColumnGuess:
+    return ColumnGuess(name, "deg", channel="delta", reason=reason, **keys)
 
 
 def _is_pulse_width(values: Floats) -> bool:

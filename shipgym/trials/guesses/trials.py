@@ -1,15 +1,17 @@
 """Logs read with guessed columns and conventions, corrected by what checks propose."""
 
+import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from shipgym.checks import quoted, shown
 from shipgym.errors import InputError
+from shipgym.trials.columns import ColumnGuess
 from shipgym.trials.conventions import Conventions
-from shipgym.trials.guesses.columns import RUDDERS, ColumnGuess, guess_columns
+from shipgym.trials.guesses.columns import RUDDERS, guess_columns
 from shipgym.trials.guesses.speeds import settle_speeds
 from shipgym.trials.guesses.units import UNKNOWN
 from shipgym.trials.readers.cell_texts import number_with_side
@@ -97,11 +99,7 @@ class TrialGuess:
     def unused(self) -> list[str]:
         """Columns of which no channel was made."""
         used: set[Any] = {*QUANTITIES} if not self.columns else set()
-        for guess in self.columns:
-            used.add(guess.column)
-            for _, value in guess.extra:
-                names = value if isinstance(value, tuple) else [value]
-                used.update(names)
+        used.update(*(guess.names for guess in self.columns))
         header = [name for table in self.tables for name in table.header]
         return [name for name in header if name not in used]
 
@@ -115,8 +113,8 @@ class TrialGuess:
         """What each channel, and the rudder's sign, was read as, and why."""
         reading = {}
         for one in self.columns:
-            extra = "".join(f", {key} {value}" for key, value in one.extra)
-            where = f"column '{one.column}' in {one.unit}{extra}"
+            extra = "".join(f", {key} {value}" for key, value in one.extra.items())
+            where = f"column '{one.name}' in {one.unit}{extra}"
             reading[one.channel] = f"{where}, unit {one.reason}"
         for convention in self.conventions:
             reading[convention.name] = f"{convention.value}: {convention.reason}"
@@ -132,13 +130,13 @@ class TrialGuess:
         for k, one in enumerate(self.columns):
             if one.channel == name:
                 because = f"by the check that refused {one.unit} ({one.reason})"
-                self.columns[k] = one._replace(unit=value, reason=because)
+                self.columns[k] = replace(one, unit=value, reason=because)
                 return
         self.conventions.append(ConventionGuess(name, value, reason))
 
     def read(self) -> Trial:
         """Read the log with the guesses so far."""
-        columns = {one.channel: one.as_column for one in self.columns}
+        columns = {one.channel: one for one in self.columns}
         words: dict[str, Any] = {one.name: one.value for one in self.conventions}
         conventions = Conventions(**words, where=f"{self.paths[0]}:")
         log = import_tables(self.tables, columns or None, conventions)
@@ -179,9 +177,9 @@ def guess_trial(path: str | Path, *others: str | Path) -> TrialGuess:
 def _take_frame(guess: TrialGuess) -> None:
     """Count angles from east where the names of their columns are those of ROS."""
     for one in guess.columns:
-        if one.channel in ("psi", "r") and _ROS.search(one.column):
+        if one.channel in ("psi", "r") and _ROS.search(one.name):
             reason = (
-                f"'{one.column}' is named as messages of ROS, whose angles count from"
+                f"'{one.name}' is named as messages of ROS, whose angles count from"
                 " east and to port; check it with a turn whose side is known"
             )
             guess.take("frame", "enu", reason)
@@ -220,7 +218,7 @@ def _guess_tables(guess: TrialGuess) -> None:
         guess.decisions += _unknown_units(found)
         for channel, one in settle_speeds(table, found).items():
             if len(tables) > 1 and channel != "t":
-                one = one._replace(reason=f"{one.reason}; from {table.path.name}")
+                one = replace(one, reason=f"{one.reason}; from {table.path.name}")
             columns.setdefault(channel, one)
     guess.columns = list(columns.values())
     _ask_for_missing(guess)
@@ -248,7 +246,7 @@ def _rudder_side(guess: TrialGuess, trial: Trial) -> RudderSide | None:
     rudder = trial.channels.get("delta", trial.channels.get("delta_command"))
     if "psi" not in trial or rudder is None:
         return None
-    names = {one.column for one in guess.columns if one.channel in RUDDERS}
+    names = {one.name for one in guess.columns if one.channel in RUDDERS}
     for table in guess.tables:
         for name in names.intersection(table.header):
             if number_with_side(table.first_text(name)) is not None:
@@ -271,9 +269,9 @@ def _unknown_units(columns: dict[str, ColumnGuess]) -> list[Decision]:
         unit = f'unit = "{si_unit(guess.channel)}" }} where that is its unit'
         if guess.channel in RUDDERS:
             unit = "full = 100 } where 100 of it are 35 deg of rudder"
+        name = json.dumps(guess.name, ensure_ascii=False)
         choices = (
-            f"column {guess.quoted}, whose unit {guess.reason}:"
-            f" {{ column = {guess.quoted}, {unit}"
+            f"column {name}, whose unit {guess.reason}: {{ column = {name}, {unit}"
         )
         decisions.append(Decision("columns", guess.channel, choices))
     return decisions

@@ -51,11 +51,6 @@ class UnitGuess(NamedTuple):
     unit: str
     reason: str = "from its name"
 
-    @property
-    def is_named(self) -> bool:
-        """True if the column's name ends with the unit."""
-        return self.reason == "from its name"
-
 
 def named_unit(
     units: list[str], channel: str, reason: str = "from its name"
