@@ -83,24 +83,21 @@ def read_positions(
     latitude, longitude = np.abs(latitudes), np.abs(longitudes)
     none: Flags = np.isin(latitude, (91.0, 99.0, 999.0, 9999.0))
     none |= np.isin(longitude, (181.0, 999.0, 9999.0))
-
-    sum_of_both = latitude + longitude
-    is_zero = sum_of_both == 0.0
-    others = sum_of_both[~is_zero]
-    if np.nanmin(others, initial=np.inf) > 1.0:
-        none |= is_zero
+    both = latitude + longitude
+    if np.nanmin(both[both != 0.0], initial=np.inf) > 1.0:
+        none |= both == 0.0
     latitudes[none] = longitudes[none] = np.nan
     return latitudes, longitudes, int(none.sum())
 
 
 _NUMBER = r"\d+(?:[.,]\d+)?"
 _ANGLE = re.compile(
-    r"\s*(?P<before>[NSEW])?\s*"
-    rf"(?P<sign>[-+]?)(?P<degrees>{_NUMBER})"
-    rf"(?:\s*[°º\s]\s*(?P<minutes>{_NUMBER}))?"
-    rf"(?:\s*['\u2032\u2019\s]\s*(?P<seconds>{_NUMBER}))?"
+    r"\s*([NSEW])?\s*"
+    rf"([-+]?)({_NUMBER})"
+    rf"(?:\s*[°º\s]\s*({_NUMBER}))?"
+    rf"(?:\s*['\u2032\u2019\s]\s*({_NUMBER}))?"
     "\\s*['\u2032\u2019\"\u2033\u201d]{0,2}\\s*"
-    r"(?P<after>[NSEW])?\s*",
+    r"([NSEW])?\s*",
     re.IGNORECASE,
 )
 
@@ -113,35 +110,32 @@ def _read_angles(table: LogTable, column: Column) -> Floats:
     cell that is none of these.
     """
     plain = table.plain_numbers(column.name)
-    largest = 0.0 if plain is None else np.nanmax(np.abs(plain), initial=0.0)
-    if plain is not None and column.unit == "deg" and largest < 1000.0:
+    has_minutes = column.unit != "deg"
+    if plain is not None and not has_minutes and np.nanmax(np.abs(plain)) < 1000.0:
         return plain.copy()
     cells = table.texts(column.name)
     matches = [_ANGLE.fullmatch(cell) for cell in cells]
-    has_minutes = column.unit != "deg" or any(
-        re.match(r"\d{4}", match["degrees"]) for match in matches if match
-    )
+    has_minutes |= any(match and re.match(r"\d{4}", match[3]) for match in matches)
     angles = [match and _degrees(match, has_minutes) for match in matches]
-    unread = [k for k, cell in enumerate(cells) if cell and angles[k] is None]
-    if not unread:
-        return np.array(angles, dtype=np.float64)
-    row = unread[0]
-    if is_number(cells[row]):  # such as 1e-05
-        return table.numbers(column.name)
-    raise InputError(
-        f"{table.cell(row, column.name)}: expected degrees (57.6872), degrees and"
-        f" minutes (57°41.234'N) or ddmm.mmm (5741.234N), got {cells[row]!r}"
-    )
+    for row, cell in enumerate(cells):
+        if cell and angles[row] is None:
+            if is_number(cell):  # such as 1e-05
+                return table.numbers(column.name)
+            raise InputError(
+                f"{table.cell(row, column.name)}: expected degrees (57.6872), degrees"
+                f" and minutes (57°41.234'N) or ddmm.mmm (5741.234N), got {cell!r}"
+            )
+    return np.array(angles, dtype=np.float64)
 
 
 def _degrees(match: re.Match[str], has_minutes: bool) -> float | None:
     """An angle in degrees; None for one of 60 minutes or seconds and more."""
-    parts = [match[name] or "0" for name in ("degrees", "minutes", "seconds")]
-    degrees, minutes, seconds = (float(part.replace(",", ".")) for part in parts)
-    if has_minutes and match["minutes"] is None:
+    before, sign, *parts, after = match.groups()
+    degrees, minutes, seconds = (float((one or "0").replace(",", ".")) for one in parts)
+    if has_minutes and parts[1] is None:
         degrees, minutes = divmod(degrees, 100.0)
     if minutes >= 60.0 or seconds >= 60.0:
         return None
     size = degrees + minutes / 60.0 + seconds / 3600.0
-    side = (match["before"] or match["after"] or "N").upper()
-    return -size if (side in "SW") != (match["sign"] == "-") else size
+    side = (before or after or "N").upper()
+    return -size if (side in "SW") != (sign == "-") else size

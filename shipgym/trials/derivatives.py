@@ -1,7 +1,6 @@
 """Time derivatives of sampled and noisy signals."""
 
 import math
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -20,16 +19,8 @@ def time_derivative(t: Floats, values: Floats) -> Floats:
     to speak of and a cubic spline through all of them is differentiated. Steps of the
     time, s, may differ.
     """
-    return _derivative(t.tobytes(), values.tobytes()).copy()
-
-
-@lru_cache(maxsize=8)  # a log is read again where a check proposes another setting
-def _derivative(t_bytes: bytes, value_bytes: bytes) -> Floats:
-    """Derivative of float64 values by their times, both as bytes."""
     from scipy.interpolate import make_interp_spline
 
-    t = np.frombuffer(t_bytes)
-    values = np.frombuffer(value_bytes)
     n = t.size
     since_start = t - t[0]
     step = since_start[-1] / (n - 1)

@@ -22,24 +22,20 @@ _ERROR_RATE = 0.01
 _FEWEST_WINDOWS = 3
 
 
-class RudderSign(NamedTuple):
+class RudderSide(NamedTuple):
     """The side to which a positive rudder steers; None where a log does not tell."""
 
     side: str | None
-    certainty: float  # the gain in its standard errors
-    turned: float = 0.0  # rad, with the rudder laid to starboard by its sign
+    reason: str = "the log does not tell"
+    is_sure: bool = False  # so that another side is refused
 
     @property
-    def reason(self) -> str:
-        """The evidence, in words."""
-        evidence = (
-            f"the turning that follows the rudder, {abs(self.certainty):.0f} standard"
-            " errors"
+    def choices(self) -> str:
+        """What there is to decide."""
+        return (
+            '"starboard" or "port", the side to which the ship turns with a positive'
+            f" rudder: {self.reason}"
         )
-        if self.turned:
-            turned = abs(self.turned) / DEGREE
-            evidence = f"a turn of {turned:.0f} deg with the rudder to one side"
-        return f"{evidence}, wrong in less than {_ERROR_RATE:.0%} of simulated logs"
 
 
 class _Fit(NamedTuple):
@@ -50,7 +46,7 @@ class _Fit(NamedTuple):
     is_clear: bool  # explains a tenth of the turning, in several windows
 
 
-def rudder_sign(t: Floats, psi: Floats, delta: Floats) -> RudderSign:
+def rudder_side(t: Floats, psi: Floats, delta: Floats) -> RudderSide:
     """Find the side to which a positive rudder steers.
 
     Parameters
@@ -62,11 +58,13 @@ def rudder_sign(t: Floats, psi: Floats, delta: Floats) -> RudderSign:
     """
     turned = _turned(psi, delta)
     if turned:
-        return RudderSign(_side(turned), certainty=0.0, turned=turned)
+        degrees = abs(turned) / DEGREE
+        evidence = f"a turn of {degrees:.0f} deg with the rudder to one side"
+        return _side(turned, evidence, is_sure=True)
     windows = _windows(t, psi, delta)
     low, high = np.quantile(delta, [0.02, 0.98])
     if high - low <= 2.0 * DEGREE or windows.shape[1] < _FEWEST_WINDOWS:
-        return RudderSign(None, certainty=0.0)
+        return RudderSide(None)
 
     # of stable ships, and of one that is not
     relative = np.concatenate([[-1.0], np.geomspace(0.1, 10.0, 7)])
@@ -76,31 +74,34 @@ def rudder_sign(t: Floats, psi: Floats, delta: Floats) -> RudderSign:
     best = min(fits, key=lambda fit: fit.squares)
     as_good = [fit for fit in fits if fit.squares < 1.05 * best.squares]
     agree = all(fit.certainty * best.certainty > 0.0 for fit in as_good)
-    fewest_errors = 5.0
-    is_known = agree and best.is_clear and abs(best.certainty) > fewest_errors
-    return RudderSign(_side(best.certainty) if is_known else None, best.certainty)
+    errors = abs(best.certainty)
+    if not agree or not best.is_clear or errors <= 5.0:
+        return RudderSide(None)
+    evidence = f"the turning that follows the rudder, {errors:.0f} standard errors"
+    # twice the errors of a guess: a refusal has to be right
+    return _side(best.certainty, evidence, is_sure=errors > 10.0)
 
 
-def check_rudder_sign(log: Log) -> None:
+def _side(value: float, evidence: str, *, is_sure: bool) -> RudderSide:
+    reason = f"{evidence}, wrong in less than {_ERROR_RATE:.0%} of simulated logs"
+    return RudderSide("starboard" if value > 0.0 else "port", reason, is_sure)
+
+
+def check_rudder_side(log: Log) -> None:
     """Refuse a rudder that is positive to port, by the turning that follows it."""
     if not log.has("delta") or not (log.has("psi") or log.has("r")):
         return
     psi = log.channels.get("psi")
     if psi is None:
         psi = integral(log.t, log.channels["r"])
-    found = rudder_sign(log.t, psi, log.channels["delta"])
-    surely = 10.0  # standard errors, twice those of a guess: a refusal has to be right
-    if found.side == "port" and (found.turned or abs(found.certainty) > surely):
+    found = rudder_side(log.t, psi, log.channels["delta"])
+    if found.side == "port" and found.is_sure:
         raise InputError(
             f"{log.where}: expected a positive rudder to turn the bow to starboard, got"
             f" the opposite sign ({found.reason}); write rudder_positive ="
             ' "port" in [conventions], or take it out if it stands there',
             [("rudder_positive", "port")],
         )
-
-
-def _side(value: float) -> str:
-    return "starboard" if value > 0.0 else "port"
 
 
 def _turned(psi: Floats, delta: Floats) -> float:

@@ -52,6 +52,8 @@ KINDS = (
     "random",
 )
 
+_RUDDERS = ("delta", "delta_command")
+
 #: What a trial is used for.
 USES = ("fit", "validate", "skip")
 
@@ -229,18 +231,10 @@ class Trial:
 
     def _settings(self) -> dict[str, Any]:
         """The keyword arguments that make this trial of its channels."""
-        return {
-            "name": self.name,
-            "kind": self.kind,
-            "use": self.use,
-            "derived": self.derived,
-            "length": self.length,
-            "repaired": dict(self.repaired),
-            "raw": vars(self)["_raw"],
-            "over_ground": self.over_ground,
-            "notes": self.notes,
-            "magnetic": self.magnetic,
-        }
+        names = ("name", "kind", "use", "derived", "length", "over_ground", "notes")
+        settings = {name: getattr(self, name) for name in (*names, "magnetic")}
+        repaired = dict(self.repaired)
+        return settings | {"repaired": repaired, "raw": vars(self)["_raw"]}
 
     def with_(self, **changes: Any) -> Trial:
         """Return a copy with a changed name, kind, use, length or ``over_ground``."""
@@ -434,24 +428,23 @@ def _check_time(
 
 def _check_angles(t: Floats, channels: Mapping[str, Floats], where: str) -> None:
     """Refuse arrays of a rudder, heading or yaw rate in degrees."""
-    remedy = "expected an array in radians, got one that is likely in degrees"
-    for name in channels.keys() & {"delta", "delta_command"}:
-        values = channels[name]
-        k = int(np.argmax(np.abs(values)))
-        rounding = 1.0 + 1e-9
-        if abs(values[k]) > rounding * LARGEST_MAGNITUDES[name]:
-            raise InputError(
-                f"{where}: {name}: {remedy} ({values[k]:g} in sample {k}); give"
-                f" numpy.radians({name})"
-            )
+    wrong = {name: np.abs(channels.get(name, 0.0)).max() for name in _RUDDERS}
+    for name, largest in wrong.items():
+        if largest > (1.0 + 1e-9) * LARGEST_MAGNITUDES[name]:
+            k = int(np.argmax(np.abs(channels[name])))
+            raise _in_degrees(where, name, f" ({channels[name][k]:g} in sample {k})")
     if {"psi", "r"} <= channels.keys():
         gain = abs(rate_gain(t, channels["psi"], channels["r"])) * DEGREE
         for name, factor in (("psi", gain), ("r", DEGREE**2 / max(gain, 1e-9))):
             if 0.5 < factor < 2.0:
-                raise InputError(
-                    f"{where}: {name}: {remedy}, by psi and r together; give"
-                    f" numpy.radians({name})"
-                )
+                raise _in_degrees(where, name, ", by psi and r together")
+
+
+def _in_degrees(where: str, name: str, evidence: str) -> InputError:
+    return InputError(
+        f"{where}: {name}: expected an array in radians, got one that is likely in"
+        f" degrees{evidence}; give numpy.radians({name})"
+    )
 
 
 def _frozen_array(values: npt.ArrayLike, where: str, size: int | None = None) -> Floats:

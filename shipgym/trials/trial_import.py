@@ -21,7 +21,7 @@ from shipgym.trials.plausibility.over_ground import check_over_ground
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.recording import Recording, read_recording
 from shipgym.trials.resampling import Log, Signal, Signals, on_one_clock
-from shipgym.trials.rudder_sign import check_rudder_sign
+from shipgym.trials.rudder_sign import check_rudder_side
 from shipgym.trials.units import QUANTITIES
 
 #: What a log lacks, by the channels of which it has none.
@@ -170,7 +170,7 @@ def _check_channels(
         check_yaw_rate(log, locator)
     if log.has("x", "y", "psi", "u", "v"):
         check_velocity(log, conventions.velocity_frame, locator)
-    check_rudder_sign(log)
+    check_rudder_side(log)
     return remarks
 
 

@@ -56,7 +56,7 @@ def test_a_table_is_read_however_it_is_written(tmp_path, content, settings):
     [
         (b"\n \n", "got an empty file"),
         (b"PK\x03\x04\x14\x00\x06\x00", "got an archive (zip"),
-        (b"\x89PNG\r\n\x1a\n", "expected a log, got a PDF or a picture"),
+        (b"\x89PNG\r\n\x1a\n", "line 1: expected a text in UTF-8, got byte 0x89"),
         (b"t,u\n0,1\n1,\xff\n", "line 3: expected a text in UTF-8, got byte 0xff"),
         ("t,u\n0,1\n".encode("utf-16")[:-1], "line 2: expected a text in UTF-8"),
         (b"\x01\x02\x03\n", "line 1: expected column names, got"),

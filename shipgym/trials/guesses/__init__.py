@@ -5,10 +5,10 @@ from shipgym.trials.guesses.columns import guess_columns
 from shipgym.trials.guesses.trials import (
     ConventionGuess,
     Decision,
-    RudderSide,
     TrialGuess,
     guess_trial,
 )
+from shipgym.trials.rudder_sign import RudderSide
 
 __all__ = [
     "ColumnGuess",

@@ -21,7 +21,6 @@ from shipgym.trials.guesses.units import (
     unit_by_size,
     unknown_unit,
 )
-from shipgym.trials.readers.cell_texts import unit_in_cell
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.units import QUANTITIES, split_unit
 
@@ -203,10 +202,6 @@ def _unit_by_cells(table: LogTable, column: str, channel: str) -> UnitGuess:
     if _SIGNAL_K.match(column) and channel not in ("t", "lat", "lon"):
         size = unit_by_size(None, channel)
         return size._replace(reason="paths of Signal K are in SI units")
-    units = unit_in_cell(table.first_text(column))
-    in_cells = named_unit(units, channel, "from its cells")
-    if in_cells is not None:
-        return in_cells
     values = table.likely_numbers(column)
     if values is not None and np.nanmax(np.abs(values), initial=0.0) < 6.3:
         for unit, patterns in _column_names()["units"].items():

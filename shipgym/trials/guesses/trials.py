@@ -17,7 +17,7 @@ from shipgym.trials.guesses.units import UNKNOWN
 from shipgym.trials.readers.cell_texts import number_with_side
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable
-from shipgym.trials.rudder_sign import rudder_sign
+from shipgym.trials.rudder_sign import RudderSide, rudder_side
 from shipgym.trials.trial import Trial, trial_of
 from shipgym.trials.trial_import import import_tables
 from shipgym.trials.units import QUANTITIES, si_unit
@@ -30,21 +30,6 @@ _ROS = re.compile(
     r"(^|[._/])(orientation|pose|twist|angular_?velocity)[._/](?!.*(head|hdg|compass))",
     re.IGNORECASE,
 )
-
-
-class RudderSide(NamedTuple):
-    """The side to which a positive rudder steers; None where it cannot be told."""
-
-    side: str | None
-    reason: str
-
-    @property
-    def choices(self) -> str:
-        """What there is to decide."""
-        return (
-            '"starboard" or "port", the side to which the ship turns with a positive'
-            f" rudder: {self.reason}"
-        )
 
 
 class ConventionGuess(NamedTuple):
@@ -251,11 +236,9 @@ def _rudder_side(guess: TrialGuess, trial: Trial) -> RudderSide | None:
         for name in names.intersection(table.header):
             if number_with_side(table.first_text(name)) is not None:
                 return RudderSide("starboard", "the letters S and P of its values")
-    found = rudder_sign(trial.t, trial["psi"], rudder)
-    if found.side is None:
-        return RudderSide(None, "the log does not tell")
+    found = rudder_side(trial.t, trial["psi"], rudder)
     is_turned = any(one.name == "rudder_positive" for one in guess.conventions)
-    return RudderSide("port" if is_turned else found.side, found.reason)
+    return found._replace(side="port") if found.side and is_turned else found
 
 
 def _unknown_units(columns: dict[str, ColumnGuess]) -> list[Decision]:

@@ -26,7 +26,11 @@ _BY_SIZE = {
     "shaft speed": (10.0, "rpm"),
 }
 #: Days from 1954 to 2119 in spreadsheets, from 1916 in MATLAB.
-_DAYS = {"excel days": (20_000.0, 80_000.0), "matlab days": (7e5, 8e5)}
+_DAYS = {
+    "excel days": (20_000.0, 80_000.0),
+    "matlab days": (7e5, 8e5),
+    "days": (-1.0, 2.0),
+}
 
 
 #: Stands for a unit that is none of those which are known.
@@ -104,26 +108,19 @@ def unit_by_size(values: Floats | None, channel: str) -> UnitGuess:
 def _time_by_size(values: Floats) -> UnitGuess:
     """Unit of times by their size and by how far the rows are apart."""
     known = values[np.isfinite(values)]
-    largest = float(known.max(initial=0.0))
+    least, largest = known.min(initial=np.inf), known.max(initial=0.0)
     steps = np.diff(known)
-    forward = steps[steps > 0.0]
-    step = float(np.median(forward)) if forward.size else 1.0
+    step = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 1.0
     by_size = f"from its size, up to {largest:.4g}"
-    since_1970 = unit_since_1970(float(known.min())) if known.size else None
+    by_step = f"from its rows, which are {step:.3g} apart"
+    since_1970 = unit_since_1970(float(least)) if known.size else None
     if since_1970 and step * UNITS["time"][since_1970] < 3600.0:
         return UnitGuess(since_1970, by_size)
-
-    in_days = 2e-3  # three minutes, and far less than a row in seconds
-    by_step = f"from its rows, which are {step:.3g} apart"
-    if step < in_days:
-        for days, (least, most) in _DAYS.items():
-            if known.min() > least and largest < most:
-                return UnitGuess(days, f"{by_step}, and its size, up to {largest:.4g}")
-        is_part_of_day = step >= 1e-6 and largest < 2.0
-        if is_part_of_day:
-            return UnitGuess("days", by_step)
+    for days, (first, last) in _DAYS.items():
+        # apart by less than three minutes, and far less than a row in seconds
+        if first < least and largest < last and step < 2e-3:
+            return UnitGuess(days, f"{by_step}, and its size, up to {largest:.4g}")
     for finer in ("ms", "us", "ns"):
-        in_seconds = step * UNITS["time"][finer]
-        if step > 20.0 and 0.005 <= in_seconds <= 20.0:
+        if step > 20.0 and 0.005 <= step * UNITS["time"][finer] <= 20.0:
             return UnitGuess(finer, by_step)
     return UnitGuess("s", by_size)

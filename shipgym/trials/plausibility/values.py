@@ -35,32 +35,19 @@ def check_ranges(channels: Mapping[str, Floats], locator: Locator) -> None:
         declared = locator.columns[channel].unit
         own = si_factor(channel, declared)
         largest = np.nanmax(np.abs(values)) / own
-        fitting = _fitting_units(channel, limit / largest)
+        factors = UNITS[QUANTITIES[channel]]
+        fitting = [
+            (channel, unit) for unit in factors if factors[unit] <= limit / largest
+        ]
         remedy = "check the column and its unit, or correct the value"
         if fitting:
             remedy = f"likely a wrong unit: declare {locator.declaration(*fitting[0])}"
         raise InputError(
             f"{locator.place(first, channel)}: expected {channel} of at most"
-            f" {_spelled(limit / own, declared)}, got"
-            f" {_spelled(float(values[first]) / own, declared)}; {remedy}",
+            f" {limit / own:g} {declared}, got {values[first] / own:g} {declared};"
+            f" {remedy}",
             fitting,
         )
-
-
-def _fitting_units(channel: str, largest_factor: float) -> list[tuple[str, str]]:
-    """Units of a channel whose factor to SI is at most that."""
-    factors = UNITS[QUANTITIES[channel]]
-    return [(channel, unit) for unit in factors if factors[unit] <= largest_factor]
-
-
-def _spelled(number: float, unit: str) -> str:
-    """A number with its unit; radians in degrees too, in brackets."""
-    text = f"{number:g} {unit}"
-    if unit not in ("rad", "rad/s"):
-        return text
-    degrees = math.degrees(number)
-    in_degrees = unit.replace("rad", "deg")
-    return f"{text} ({degrees:g} {in_degrees})"
 
 
 def without_spikes(psi: Floats) -> tuple[Floats, int]:

@@ -2,8 +2,6 @@
 
 import re
 
-from shipgym.trials.units import spelled_units
-
 #: Words that stand for "no value"; so does a text of dashes or other signs alone.
 _MISSING_WORDS = re.compile(
     r"-?nan(\(ind\))?|#?n\.?/?a\.?|\(?null\)?|nil|none|nat|<na>|no ?data|no value"
@@ -14,9 +12,6 @@ _MISSING_WORDS = re.compile(
 _STARBOARD = "s|r|stbd|stb|sb|starboard|right|steuerbord|td|tribord|estribor|右"
 _PORT = "p|l|port|bb|backbord|babord|bâbord|bd|babor|left|左"
 _NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)"
-_WITH_UNIT = re.compile(
-    rf"([-+]?{_NUMBER}(?:e[-+]?\d+)?)\s*([^\W\d_][\w/.]*|°\w?|%)", re.IGNORECASE
-)
 _WITH_SIDE = [
     (sign, re.compile(rf"(?:(?:{words})\.?\s*)?({_NUMBER})\s*°?(?:\s*(?:{words})\.?)?"))
     for sign, words in ((1.0, _STARBOARD), (-1.0, _PORT))
@@ -44,15 +39,9 @@ def is_number(text: str) -> bool:
 
 
 def cell_number(text: str) -> float | None:
-    """A number, with a side or a unit or neither; None for other text."""
+    """A number, with a side or without; None for other text."""
     text = text.replace("\u2212", "-")  # a minus as typographers write it
-    if is_number(text):
-        return float(text)
-    number = number_with_side(text)
-    if number is None and unit_in_cell(text):
-        match = _WITH_UNIT.fullmatch(text)
-        number = float(match[1]) if match else None
-    return number
+    return float(text) if is_number(text) else number_with_side(text)
 
 
 def number_with_side(text: str) -> float | None:
@@ -61,20 +50,8 @@ def number_with_side(text: str) -> float | None:
     To starboard positive.
     """
     bare = text.lower()
-    has_letters = any(letter.isalpha() for letter in bare)
-    if not has_letters:
-        return None
-    for sign, pattern in _WITH_SIDE:
-        match = pattern.fullmatch(bare)
-        if match:
+    matches = ((sign, pattern.fullmatch(bare)) for sign, pattern in _WITH_SIDE)
+    for sign, match in matches:
+        if match and any(map(str.isalpha, bare)):
             return sign * float(match[1])
     return None
-
-
-def unit_in_cell(text: str) -> list[str]:
-    """Units that stand behind a number such as "13.6 kn"; none for other texts."""
-    match = _WITH_UNIT.fullmatch(text)
-    if match is None:
-        return []
-    # T: a bearing from true north
-    return ["deg"] if match[2] == "T" else spelled_units(match[2].lower())

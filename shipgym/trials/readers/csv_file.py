@@ -152,12 +152,13 @@ def _columns(
 
     if not rows:
         return [np.array([], object) for _ in range(n_cells)]
-    samples = [split(row, delimiter) for row in (*rows[:100], *rows[-100:])]
-    as_texts = [
+    samples = (*rows[:100], *rows[-100:])
+    as_texts = {
         k
-        for k in range(n_cells)
-        if any(re.match(r"\s*0\d", cells[k]) for cells in samples)
-    ]
+        for row in samples
+        for k, cell in enumerate(split(row, delimiter)[:n_cells])
+        if re.match(r"\s*0\d", cell)
+    }
     points = any("." in row for row in rows[:100])
     try:
         frame = pd.read_csv(

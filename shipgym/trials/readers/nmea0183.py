@@ -5,8 +5,8 @@ satellites) are passed over.
 """
 
 import re
-from collections import Counter
-from collections.abc import Sequence
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from math import copysign, isfinite, nan
 from typing import NamedTuple
@@ -33,39 +33,27 @@ class _Number(NamedTuple):
 
     at: int
     unit: str
-    side: int | None
-    letters: dict[int, str]  # with which it counts, by place
-    required: set[int]  # places that must have one
+    side: int | None = None
+    when: Mapping[str, str] = {}
+    must: Mapping[str, str] = {}
 
     def counts(self, fields: Sequence[str]) -> bool:
         """Return whether the letters beside a number say that it counts."""
-        return all(
-            fields[at] in (*letters,) or not (fields[at] or at in self.required)
-            for at, letters in self.letters.items()
+        has_side = self.side is None or fields[self.side] in _SIGNS
+        return has_side and all(
+            fields[int(at)] in letters and (fields[int(at)] or at not in self.must)
+            for at, letters in {**self.when, **self.must}.items()
         )
-
-
-def _number_at(text: str) -> _Number:
-    at, unit, *words = text.split()
-    side = None
-    if words and words[0].isdigit():
-        side = int(words[0])
-        words[0] += ":NSEW"
-    letters = {int(at): allowed for at, _, allowed in map(_parted, words)}
-    required = {int(at) for at, sign, _ in map(_parted, words) if sign == ":"}
-    return _Number(int(at), unit, side, letters, required)
-
-
-def _parted(word: str) -> list[str]:
-    return re.split("([=:])", word)
 
 
 _TABLE = shipped_toml("shipgym.trials.readers", "nmea0183.toml")
 #: Numbers of each kind of sentence by channel.
 _NUMBERS: dict[str, dict[str, _Number]] = {
     kind: {
-        channel: _number_at(f"{text} {entry.get('status', '')}")
-        for channel, text in entry.items()
+        channel: _Number(
+            **place | {"when": place.get("when", {}) | entry.get("status", {})}
+        )
+        for channel, place in entry.items()
         if channel not in ("status", "time", "date", "day")
     }
     for kind, entry in _TABLE.items()
@@ -101,22 +89,24 @@ def hear_sentences(lines: Sequence[str], heard: Heard) -> None:
     another number of fields.
     """
     found = _find(lines, heard)
-    shapes: dict[str, Counter[tuple[bool, int]]] = {}
+    shapes: dict[str, Counter[tuple[bool, int]]] = defaultdict(Counter)
     for one in found:
-        shapes.setdefault(one.source, Counter())[one.shape] += 1
+        shapes[one.source][one.shape] += 1
     usual = {source: shape.most_common(1)[0][0] for source, shape in shapes.items()}
     lacking = 0
     without_status: list[str] = []
     for one in found:
-        fields = one.text.split(",")[1:]
+        kind = one.source[2:]
+        given = [field.strip() for field in one.text.split(",")[1:]]
+        fields = given + [""] * _MOST_FIELDS
         try:
             if not one.checksum and one.shape != usual[one.source]:
                 raise ValueError("expected a checksum, or as many fields as usual")
             summed = NMEASentence.checksum(one.text)
             if one.checksum and int(one.checksum[1:], 16) != summed:
                 raise ValueError("expected another checksum")
-            numbers, lacks_status = _numbers(one.source[2:], fields)
-            time = _time(one.source[2:], fields)
+            numbers = _transducers(fields) if kind == "XDR" else _numbers(kind, fields)
+            time = _time(kind, fields)
         except ValueError:
             heard.count += 1
             heard.damaged.append(one.line)
@@ -127,7 +117,8 @@ def hear_sentences(lines: Sequence[str], heard: Heard) -> None:
             second = heard.channels["delta"][port_source(one.source)]
             second.append(Value(one.line, time, port))
         lacking += not one.checksum
-        without_status += [one.source] * lacks_status
+        if (numbers or port is not None) and _lacks_status(kind, fields):
+            without_status.append(one.source)
     if lacking:
         heard.notes.append(
             f"{lacking} of {len(found)} sentences have no checksum: nothing protects"
@@ -141,43 +132,38 @@ def hear_sentences(lines: Sequence[str], heard: Heard) -> None:
         )
 
 
-def _find(
-    lines: Sequence[str],
-    heard: Heard,
-) -> list[_Found]:
+def _find(lines: Sequence[str], heard: Heard) -> list[_Found]:
     """Sentences of known kinds; the stamps of their lines are heard."""
     found = []
     for number, line in enumerate(lines, start=1):
-        if "$" not in line:
-            continue
-        matches = [*_SENTENCE.finditer(line)]
-        for match in matches:
-            one = _Found(number, match[1], match[2] or "")
-            found.append(one)
+        matches = [*_SENTENCE.finditer(line)] if "$" in line else []
+        found += [_Found(number, match[1], match[2] or "") for match in matches]
         if matches:
-            before = line[: matches[0].start()]
-            after = line[matches[-1].end() :]
+            before, after = line[: matches[0].start()], line[matches[-1].end() :]
             heard.stamp(number, before or after)
     return found
 
 
-def _numbers(kind: str, given: Sequence[str]) -> tuple[dict[str, float], bool]:
-    """Numbers of a sentence by channel, and whether one of them has an empty status.
+def _lacks_status(kind: str, fields: Sequence[str]) -> bool:
+    """Return whether a number counts whose status is empty."""
+    return any(
+        not fields[int(at)] and letters.startswith("A")
+        for place in _NUMBERS.get(kind, {}).values()
+        if fields[place.at]
+        for at, letters in place.when.items()
+    )
 
-    In SI units, positions in degrees. Raises ValueError where one is broken.
+
+def _numbers(kind: str, fields: Sequence[str]) -> dict[str, float]:
+    """Numbers of a sentence by channel, in SI units, positions in degrees.
+
+    Raises ValueError where one is broken.
     """
-    if kind == "XDR":
-        return _transducers(given), False
-    fields = [field.strip() for field in (*given, *[""] * _MOST_FIELDS)]
-    numbers = {}
-    lacks_status = False
-    for channel, place in _NUMBERS[kind].items():
-        if fields[place.at] and place.counts(fields):
-            numbers[channel] = _number(fields, place)
-            lacks_status |= any(
-                not fields[at] and letters.startswith("A")
-                for at, letters in place.letters.items()
-            )
+    numbers = {
+        channel: _number(fields, place)
+        for channel, place in _NUMBERS[kind].items()
+        if fields[place.at] and place.counts(fields)
+    }
     # a heading by compass with its deviation, and true if the variation is known
     deviation = numbers.pop("deviation", 0.0)
     if "psi_magnetic" in numbers:
@@ -185,7 +171,7 @@ def _numbers(kind: str, given: Sequence[str]) -> tuple[dict[str, float], bool]:
         if "variation" in numbers:
             magnetic = numbers.pop("psi_magnetic")
             numbers.setdefault("psi", magnetic + numbers["variation"])
-    return numbers, lacks_status
+    return numbers
 
 
 def _number(fields: Sequence[str], place: _Number) -> float:
@@ -219,21 +205,19 @@ def _transducers(fields: Sequence[str]) -> dict[str, float]:
     return values
 
 
-def _time(kind: str, given: Sequence[str]) -> float:
+def _time(kind: str, fields: Sequence[str]) -> float:
     """Seconds since 1970 with a date, else of the day; nan without a time."""
     places = _TABLE.get(kind, {})
-    fields = [*given, *[""] * _MOST_FIELDS]
     match = _TIME.fullmatch(fields[places["time"]]) if "time" in places else None
     if match is None:
         return nan
     hours, minutes, seconds = map(float, match.groups())
     of_day = 3600.0 * hours + 60.0 * minutes + seconds
-    date, form = "", "%d%m%y"
-    if "date" in places:
-        date = fields[places["date"]]
+    date = fields[places["date"]] if "date" in places else ""
     if "day" in places:
-        date = "-".join(fields[places["day"] :][:3]).strip("-")
-        form = "%d-%m-%Y"
+        day, month, year = fields[places["day"] :][:3]
+        date = f"{day}{month}{year[2:]}"
     if not date:
         return of_day
-    return datetime.strptime(date, form).replace(tzinfo=UTC).timestamp() + of_day
+    moment = datetime.strptime(date, "%d%m%y").replace(tzinfo=UTC)
+    return moment.timestamp() + of_day
