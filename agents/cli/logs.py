@@ -84,15 +84,17 @@ def new_ship_command(
 
 def _facts(guessed: list[TrialGuess], out: Path) -> dict[str, Any]:
     """What the templates of ship file and summary say of the logs."""
-    first, *others = guessed
+    first, *_ = guessed
     side = _rudder_side(guessed)
     speed = _service_speed(guessed)
     named = {column.channel for one in guessed for column in one.columns}
     needs_speed = "r" in named and "psi" not in named and speed is None
     needs_speed &= any(one.trial is not None for one in guessed)
-    shared = [
-        one for one in first.columns if all(_declares(other, one) for other in others)
+    declared = [
+        {one.channel: one.declaration for one in guess.columns} for guess in guessed
     ]
+    is_shared = all(one == declared[0] for one in declared)
+    shared = first.columns if is_shared else []
     decisions = {
         one.key: one
         for guess in guessed
@@ -121,13 +123,6 @@ def _facts(guessed: list[TrialGuess], out: Path) -> dict[str, Any]:
         "needs_speed": needs_speed,
         "files": [_entry(one, shared, out.parent) for one in guessed],
     }
-
-
-def _declares(guess: TrialGuess, column: ColumnGuess) -> bool:
-    return any(
-        (one.channel, one.declaration) == (column.channel, column.declaration)
-        for one in guess.columns
-    )
 
 
 def _rudder_side(guessed: list[TrialGuess]) -> RudderSide | None:
@@ -170,14 +165,13 @@ def _entry(
     guess: TrialGuess, shared: list[ColumnGuess], folder: Path
 ) -> dict[str, Any]:
     """A log for the template of the ship file."""
-    declared = {one.declaration for one in shared}
     of_trial = []
     for one in guess.decisions:
         if one.section == "trials":
             of_trial.append(one.choices)
     return {
         "file": _toml_paths(guess.paths, folder),
-        "columns": [one for one in guess.columns if one.declaration not in declared],
+        "columns": [] if shared else guess.columns,
         "manoeuvres": _manoeuvres(guess),
         "decision": next(iter(of_trial), None),
     }

@@ -1,5 +1,6 @@
 """The ship file: a TOML file of a ship's particulars, conventions and trials."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,6 +8,7 @@ from typing import Any, Self
 
 from shipgym.checks import check_choice, check_keys, check_table, data_only, placed
 from shipgym.errors import InputError
+from shipgym.files import LARGEST_TOML, parse_toml, read_text, read_toml
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import own_structure
@@ -16,7 +18,6 @@ from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import USES, Trial, cut_trials, trial_of
 from shipgym.trials.trial_entries import TrialEntry, read_entries
 from shipgym.trials.trial_import import import_tables
-from shipgym.trials.undecided import read_decided
 
 _SECTIONS = (
     "ship",
@@ -28,6 +29,11 @@ _SECTIONS = (
     "identify",
     "wind",
     "trials",
+)
+
+#: A line whose value its reader has to choose, with the choices behind it.
+_LINE = re.compile(
+    r'[ \t]*([\w.-]+)[ \t]*=[ \t]*"decide"[ \t]*(?:#[ \t]*DECIDE:[ \t]*(.*)|#.*)?'
 )
 
 
@@ -73,7 +79,7 @@ class ShipFile:
         remedy.
         """
         path = Path(path)
-        data, undecided = read_decided(path)
+        data, undecided = _read_decided(path)
         check_keys(data, _SECTIONS, str(path))
         particulars = _read_particulars(path, data)
         steering = structure = None
@@ -159,3 +165,25 @@ def _read_options(path: Path, data: Mapping[str, Any]) -> dict[str, Any]:
         options["wind"] = data["wind"]
     data_only(options, where)
     return options
+
+
+def _read_decided(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Tables of a ship file without the values "decide", and a message for each.
+
+    A message names the line of the file and, from its comment, the choices.
+    """
+    data = read_toml(path, "ship file")
+    lines = read_text(path, "ship file", LARGEST_TOML).splitlines()
+    messages = []
+    for number, line in enumerate(lines, start=1):
+        match = _LINE.fullmatch(line)
+        if match is not None:
+            key, choices = match.groups("a value as in docs/ship_file.md")
+            messages.append(
+                f"{path}: line {number}: {key}: expected a decision, got"
+                f' "decide"; write {choices.strip()}'
+            )
+            lines[number - 1] = ""
+    if messages:
+        data = parse_toml("\n".join(lines), f"{path}:")
+    return data, tuple(messages)

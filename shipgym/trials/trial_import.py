@@ -16,8 +16,8 @@ from shipgym.trials.plausibility.agreement import (
     check_velocity,
     check_yaw_rate,
 )
-from shipgym.trials.plausibility.frozen import frozen_heading
 from shipgym.trials.plausibility.over_ground import check_over_ground
+from shipgym.trials.plausibility.values import frozen_heading
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.recording import Recording, read_recording
 from shipgym.trials.resampling import Log, Signal, Signals, on_one_clock

@@ -8,7 +8,7 @@ import numpy as np
 from shipgym.arrays import Flags, Floats
 from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
-from shipgym.trials.resampling import usual_step
+from shipgym.trials.resampling import Log, usual_step
 from shipgym.trials.units import (
     DEGREE,
     LARGEST_MAGNITUDES,
@@ -140,3 +140,29 @@ def find_outliers(t: Floats, x: Floats, y: Floats, locator: Locator) -> Flags:
     # the first and the last one have a neighbour on one side only
     is_outlier: Flags = np.insert(too_fast, 0, True) & np.append(too_fast, True)
     return is_outlier
+
+
+def frozen_heading(log: Log) -> list[str]:
+    """Remark on the longest stretch in which the heading does not change at all.
+
+    Of stretches of at least 10 s and 10 samples with the rudder over by more than 5
+    deg.
+    """
+    if not log.has("psi", "delta"):
+        return []
+    shortest = 10.0  # s
+    psi = log.channels["psi"]
+    delta = log.channels["delta"]
+    is_over = np.abs(delta) > 5.0 * DEGREE
+    is_frozen = (np.abs(np.diff(psi)) < 1e-9) & is_over[1:]
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_frozen, [False]])))
+    begins = log.t[edges[::2]]
+    ends = log.t[edges[1::2]]
+    is_long = (ends - begins >= shortest) & (np.diff(edges)[::2] >= 10)
+    if not is_long.any():
+        return []
+    k = int(np.argmax(np.where(is_long, ends - begins, 0.0)))
+    return [
+        f"the heading stands still from {begins[k]:g} to {ends[k]:g} s while the rudder"
+        " is over: the instrument was stuck; leave that part out with cut"
+    ]

@@ -4,24 +4,179 @@ The messages are sentences of NMEA 0183, PGNs of NMEA 2000 and deltas of Signal 
 mixed, with or without a time before each.
 """
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
+from shipgym.arrays import Floats
 from shipgym.checks import placed
 from shipgym.errors import InputError
+from shipgym.trials.clock_texts import is_dated
 from shipgym.trials.readers.log_table import LogTable
-from shipgym.trials.readers.message_clock import log_clock
-from shipgym.trials.readers.message_tracks import (
-    Track,
-    choose_tracks,
-    wind_over_ground,
-)
-from shipgym.trials.readers.messages import Heard, is_wind
+from shipgym.trials.readers.message_clock import Clock, log_clock, times_of
+from shipgym.trials.readers.messages import Heard, Value, is_wind
 from shipgym.trials.readers.nmea0183 import hear_sentences
 from shipgym.trials.readers.nmea2000 import hear_pgns
 from shipgym.trials.readers.signalk import hear_deltas
 from shipgym.trials.readers.text_files import text_lines
+from shipgym.trials.resampling import FEWEST_SAMPLES
+from shipgym.trials.units import DEGREE
+
+#: Preferred kinds of sentences: true headings, and of speeds through the water the log
+#: with two axes.
+_PREFERENCE = {"HDT": 3, "THS": 2, "VHW": 1, "VBW": 2}
+
+
+class Track(NamedTuple):
+    """Values of a channel over time, with the lines in which they stand."""
+
+    t: Floats
+    lines: Floats
+    values: Floats
+    source: str
+    has_dates: bool = False
+
+    @property
+    def words(self) -> str:
+        """The source, and how many values it has."""
+        return f"{self.source} ({self.t.size} value{'s' * (self.t.size != 1)})"
+
+    @property
+    def covered(self) -> float:
+        """Time, s, for which a value is not older than a few seconds."""
+        longest = 3.0
+        steps = np.append(np.diff(self.t), longest)
+        return float(np.minimum(steps, longest).sum())
+
+    def at(self, t: Floats) -> Floats:
+        """Values at other times, between those of the track on straight lines."""
+        return np.interp(t, self.t, self.values)
+
+
+def _choose_tracks(
+    heard: Heard, clock: Clock, notes: list[str]
+) -> tuple[dict[str, Track], bool]:
+    """Channels of a log, each of its best source; whether the heading is magnetic."""
+    tracks = {}
+    longest = 0.0
+    left_out = []
+    for channel, sources in heard.channels.items():
+        of_source = [
+            _track(source, sources[source], clock) for source in sorted(sources)
+        ]
+        longest = max(longest, *(track.covered for track in of_source))
+        best = tracks[channel] = _best(channel, of_source)
+        others = ", ".join(track.words for track in of_source if track is not best)
+        if others and channel != "variation":
+            name = channel.removesuffix("_magnetic")
+            left_out.append(f"{name} is from {best.words}; {others} left out")
+
+    is_magnetic = _choose_heading(tracks, left_out)
+    tracks.pop("variation", None)
+    for channel, track in list(tracks.items()):
+        is_needed = channel in ("psi", "delta") or track.covered >= 0.1 * longest
+        if not is_needed or track.t.size < FEWEST_SAMPLES:
+            del tracks[channel]
+            left_out.append(
+                f"{channel} of {track.source} left out: only {track.t.size} values"
+            )
+    by_source: dict[str, list[str]] = {}
+    for channel, track in tracks.items():
+        by_source.setdefault(track.source, []).append(channel)
+    read = [f"{', '.join(names)} from {source}" for source, names in by_source.items()]
+    notes += [f"{'; '.join(read)}; time from {clock.source}", *left_out]
+    return tracks, is_magnetic
+
+
+def _track(source: str, values: list[Value], clock: Clock) -> Track:
+    """Values of a source at their own times, else at those of their lines."""
+    lines, times, numbers = np.array(values).T
+    # to a tenth of a millisecond
+    t, first = np.unique(np.round(times_of(values, clock), 4), return_index=True)
+    return Track(t, lines[first], numbers[first], source, is_dated(times[0]))
+
+
+def _best(channel: str, tracks: Sequence[Track]) -> Track:
+    """The source to read, by the most important criterion first."""
+    most = max(track.covered for track in tracks)
+
+    def rank(track: Track) -> tuple[object, ...]:
+        """II is a display that repeats others; of two rudders one may stand still."""
+        return (
+            track.covered >= 0.5 * most,
+            channel != "delta" or np.ptp(track.values) > 0.5 * DEGREE,
+            _PREFERENCE.get(track.source[2:5], 0),
+            track.has_dates,
+            not track.source.startswith("II"),
+            track.t.size,
+            not track.source.endswith(" port"),
+        )
+
+    return max(tracks, key=rank)
+
+
+def _choose_heading(tracks: dict[str, Track], notes: list[str]) -> bool:
+    """Take the heading by compass where no true one is logged for most of the time.
+
+    The variation is added where the log has one; else it is True: the heading stays
+    magnetic.
+    """
+    compass = tracks.pop("psi_magnetic", None)
+    true = tracks.get("psi")
+    if compass is None:
+        return False
+    if true is not None:
+        is_true = true.covered >= 0.5 * compass.covered
+        read, other = (true, compass) if is_true else (compass, true)
+        if true.source != compass.source:
+            notes.append(f"psi is from {read.words}; {other.words} left out")
+        if is_true:
+            return False
+    tracks["psi"] = compass
+    variation = tracks.get("variation")
+    if variation is None:
+        return True
+    added = variation.at(compass.t)
+    tracks["psi"] = compass._replace(values=compass.values + added)
+    middle = float(np.median(added)) / DEGREE
+    notes.append(
+        f"psi is the magnetic heading of {compass.source} with the variation of"
+        f" {variation.source} added, {abs(middle):.1f} deg"
+        f" {'E' if middle >= 0.0 else 'W'}"
+    )
+    return False
+
+
+def _wind_over_ground(
+    winds: Mapping[str, Track], tracks: Mapping[str, Track]
+) -> dict[str, Track]:
+    """Wind over ground from that off the bow; empty where the velocity is missing."""
+    true = {"wind_angle", "wind_speed"} <= winds.keys()
+    kind = "wind" if true else "apparent_wind"
+    if not {f"{kind}_angle", f"{kind}_speed"} <= winds.keys():
+        return {}
+    if not true and not {"sog", "cog"} <= tracks.keys():
+        return {}
+
+    angle, speed = winds[f"{kind}_angle"], winds[f"{kind}_speed"]
+    bearing = angle.values + _continuous(tracks["psi"]).at(angle.t)
+    if true:
+        return {"wind_from": angle._replace(values=bearing), "wind_speed": speed}
+    # complex: north + i east
+    course = _continuous(tracks["cog"]).at(angle.t)
+    own = tracks["sog"].at(angle.t) * np.exp(1j * course)
+    wind = speed.values * np.exp(1j * bearing) - own
+    return {
+        "wind_from": angle._replace(values=np.angle(wind)),
+        "wind_speed": angle._replace(values=np.abs(wind)),
+    }
+
+
+def _continuous(track: Track) -> Track:
+    """An angle without jumps."""
+    return track._replace(values=np.unwrap(track.values))
 
 
 def read_messages(path: Path, content: bytes) -> LogTable:
@@ -48,18 +203,16 @@ def read_messages(path: Path, content: bytes) -> LogTable:
             f"{path}: expected sentences with a time (RMC, GGA, GLL or ZDA) or a time"
             " before each line, got none; log these too"
         )
-    chosen = choose_tracks(heard, clock)
-    tracks = dict(chosen.by_channel)
-    winds = {name: tracks.pop(name) for name in chosen.by_channel if is_wind(name)}
+    tracks, is_magnetic = _choose_tracks(heard, clock, notes)
+    winds = {name: tracks.pop(name) for name in [*tracks] if is_wind(name)}
     if winds and "psi" in tracks:
-        tracks |= wind_over_ground(winds, tracks)
-    notes += chosen.notes
+        tracks |= _wind_over_ground(winds, tracks)
     if not tracks:
         raise InputError(
             f"{path}: expected several values of a ship's motion (RMC, HDT, HDG, ROT,"
             " RSA and others), got too few: log these too"
         )
-    return _table(path, tracks, notes, magnetic=chosen.magnetic)
+    return _table(path, tracks, notes, magnetic=is_magnetic)
 
 
 def _check_damage(path: Path, heard: Heard) -> list[str]:

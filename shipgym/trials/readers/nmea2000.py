@@ -13,7 +13,6 @@ import numpy as np
 
 from shipgym.extras import library
 from shipgym.files import shipped_toml
-from shipgym.trials.readers.line_stamps import read_stamps, stamp_text
 from shipgym.trials.readers.messages import RAW_FRAME, Heard, port_source
 from shipgym.trials.units import DEGREE, KNOT
 
@@ -76,7 +75,7 @@ def hear_pgns(lines: Sequence[str], heard: Heard) -> None:
         source = f"PGN {message.pgn} of {message.sender}"
         if message.pgn == "127245" and _number(message.value("instance")) == 1.0:
             source = port_source(source)
-        heard.hear(number, source, _channels(message, unit), _time(message))
+        heard.hear(number, source, _channels(message, unit))
 
 
 def _decoded(decoder: Any, line: str) -> _Message | None:
@@ -164,10 +163,3 @@ def _channels(message: _Message, angle_unit: str) -> dict[str, float]:
         wind = winds[reference]
         values |= {f"{wind}_angle": angle, f"{wind}_speed": speed}
     return values
-
-
-def _time(message: _Message) -> float:
-    """Seconds since 1970 of a message with date and time; nan for others."""
-    date = str(message.value("date")).replace(".", "-")
-    text = stamp_text(f"{date} {message.value('time')}")
-    return float(read_stamps([text])[0]) if text.startswith(date) else np.nan

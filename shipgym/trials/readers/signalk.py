@@ -55,11 +55,8 @@ def hear_deltas(lines: Sequence[str], heard: Heard) -> None:
 
 def _delta(line: str) -> dict[str, Any]:
     """The object in a line, of which the values can be read."""
-    # a recorder of OpenCPN writes it as a cell, its quotes doubled
-    text = line.replace('""', '"') if '""updates""' in line else line
-    begin = text.index("{")
-    end = text.rindex("}") + 1
-    delta: dict[str, Any] = json.loads(text[begin:end])
+    begin, end = line.index("{"), line.rindex("}") + 1
+    delta: dict[str, Any] = json.loads(line[begin:end])
     list(_values(delta))
     return delta
 
