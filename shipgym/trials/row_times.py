@@ -75,7 +75,7 @@ def _time_cells(table: LogTable, column: Column) -> list[str]:
         return cells
     # a spreadsheet writes dates with midnight as their time
     days = [re.sub(r" [0:. ]*$", "", date) for date in table.texts(column.date)]
-    return [f"{day} {cell}".strip() for day, cell in zip(days, cells, strict=True)]
+    return [" ".join(parts).strip() for parts in zip(days, cells, strict=True)]
 
 
 def _with_colons(cells: list[str]) -> list[str]:

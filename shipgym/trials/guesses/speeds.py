@@ -27,22 +27,19 @@ def settle_speeds(
     known = _speed_by_positions(table, settled) if speeds else None
     is_si = any(guess.unit in ("rad", "rad/s") for guess in guesses.values())
     for guess in speeds:
-        values = table.likely_numbers(guess.name)
-        if values is None:
+        parts = [guess]
+        if guess.channel == "u" and "v" in settled:
+            parts.append(settled["v"])
+        values = [table.likely_numbers(part.name) for part in parts]
+        if values[0] is None:
             continue
-        sizes = np.abs(values)
-        sway = settled.get("v") if guess.channel == "u" else None
-        across = None if sway is None else table.likely_numbers(sway.name)
-        if across is not None:
-            sizes = np.hypot(values, across)
-        number = _middle(sizes[sizes < 100.0])
+        sizes = np.sqrt(sum(np.square(one) for one in values if one is not None))
         if known is not None:
-            guess = _by_positions(guess, number, known)
+            guess = _by_positions(guess, _middle(sizes[sizes < 100.0]), known)
         elif not _is_known(guess):
             guess = _guessed(guess, float(np.nanmax(sizes, initial=0.0)), is_si=is_si)
-        settled[guess.channel] = guess
-        if sway is not None:
-            settled["v"] = replace(sway, unit=guess.unit, reason=guess.reason)
+        for part in parts:
+            settled[part.channel] = replace(part, unit=guess.unit, reason=guess.reason)
     return settled
 
 

@@ -132,13 +132,12 @@ def find_outliers(t: Floats, x: Floats, y: Floats, locator: Locator) -> Flags:
         k = int(np.argmax(too_fast))
         raise InputError(
             f"{locator.place(k + 1, 'lat')}: expected the track of one ship, got a"
-            f" position that jumps {moved[k] / 1000.0:.4g} km within"
-            f" {t[k + 1] - t[k]:g} s, as in {count} of {too_fast.size} steps; likely"
-            " two ships are in one log: keep the rows of one, or declare the unit of"
-            " lat and lon"
+            f" position that jumps {moved[k]:.4g} m within {t[k + 1] - t[k]:g} s, as in"
+            f" {count} of {too_fast.size} steps; likely two ships are in one log: keep"
+            " the rows of one, or declare the unit of lat and lon"
         )
     # the first and the last one have a neighbour on one side only
-    is_outlier: Flags = np.insert(too_fast, 0, True) & np.append(too_fast, True)
+    is_outlier: Flags = np.append(True, too_fast) & np.append(too_fast, True)
     return is_outlier
 
 

@@ -153,16 +153,15 @@ def _wind_over_ground(
     winds: Mapping[str, Track], tracks: Mapping[str, Track]
 ) -> dict[str, Track]:
     """Wind over ground from that off the bow; empty where the velocity is missing."""
-    true = {"wind_angle", "wind_speed"} <= winds.keys()
-    kind = "wind" if true else "apparent_wind"
-    if not {f"{kind}_angle", f"{kind}_speed"} <= winds.keys():
+    kind = "wind" if {"wind_angle", "wind_speed"} <= winds.keys() else "apparent_wind"
+    needed = {f"{kind}_angle", f"{kind}_speed"}
+    if kind == "apparent_wind":
+        needed |= {"sog", "cog"}
+    if not needed <= {*winds, *tracks}:
         return {}
-    if not true and not {"sog", "cog"} <= tracks.keys():
-        return {}
-
     angle, speed = winds[f"{kind}_angle"], winds[f"{kind}_speed"]
     bearing = angle.values + _continuous(tracks["psi"]).at(angle.t)
-    if true:
+    if kind == "wind":
         return {"wind_from": angle._replace(values=bearing), "wind_speed": speed}
     # complex: north + i east
     course = _continuous(tracks["cog"]).at(angle.t)
@@ -217,19 +216,15 @@ def read_messages(path: Path, content: bytes) -> LogTable:
 
 def _check_damage(path: Path, heard: Heard) -> list[str]:
     """Refuse a log of many damaged messages; a note of few."""
-    damaged = len(heard.damaged)
-    if damaged > 0.1 * heard.count:
+    damaged = f"{len(heard.damaged)} of {heard.count}"
+    if len(heard.damaged) > 0.1 * heard.count:
         raise InputError(
             f"{path}: line {heard.damaged[0]}: expected hardly any damaged sentences,"
-            f" got {damaged} of {heard.count} with a wrong or no checksum or broken"
-            " fields, this the first; the log was damaged on the way: take the original"
+            f" got {damaged} with a wrong or no checksum or broken fields, this the"
+            " first; the log was damaged on the way: take the original"
         )
-    if not damaged:
-        return []
-    return [
-        f"{damaged} of {heard.count} sentences with a wrong checksum or broken"
-        " fields left out"
-    ]
+    note = f"{damaged} sentences with a wrong checksum or broken fields left out"
+    return [note] if heard.damaged else []
 
 
 def _table(

@@ -92,6 +92,11 @@ class Heard:
         for channel, value in values.items():
             self.channels[channel][source].append(Value(line, time, value))
 
+    def damage(self, line: int) -> None:
+        """Count a message that cannot be read."""
+        self.count += 1
+        self.damaged.append(line)
+
     def stamp(self, line: int, before: str) -> None:
         """Add the time that a recorder wrote before a message, if there is one."""
         text = stamp_text(before)

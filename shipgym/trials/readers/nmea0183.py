@@ -108,8 +108,7 @@ def hear_sentences(lines: Sequence[str], heard: Heard) -> None:
             numbers = _transducers(fields) if kind == "XDR" else _numbers(kind, fields)
             time = _time(kind, fields)
         except ValueError:
-            heard.count += 1
-            heard.damaged.append(one.line)
+            heard.damage(one.line)
             continue
         port = numbers.pop("port", None)
         heard.hear(one.line, one.source, numbers, time)

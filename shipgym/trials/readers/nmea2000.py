@@ -58,8 +58,7 @@ def hear_pgns(lines: Sequence[str], heard: Heard) -> None:
         try:
             message = _decoded(decoder, line) if is_raw else _printed(line)
         except (ValueError, LookupError, AttributeError):
-            heard.count += 1
-            heard.damaged.append(number)
+            heard.damage(number)
             continue
         if message is not None and message.pgn in _PGNS:
             messages[number] = message

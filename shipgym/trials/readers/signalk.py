@@ -39,8 +39,7 @@ def hear_deltas(lines: Sequence[str], heard: Heard) -> None:
         try:
             deltas[number] = _delta(line)
         except (ValueError, TypeError, AttributeError, KeyError):
-            heard.count += 1
-            heard.damaged.append(number)
+            heard.damage(number)
 
     own = _own_context(deltas.values())
     others = 0
