@@ -139,12 +139,20 @@ def _rudder_side(guessed: list[TrialGuess]) -> RudderSide | None:
     return next(iter([*known, *sides]), None)
 
 
+def _channels(guess: TrialGuess) -> set[str]:
+    """Channels that a log has by its columns or messages."""
+    in_trial = guess.trial.channels if guess.trial is not None else {}
+    return {*in_trial, *(one.channel for one in guess.columns)}
+
+
 def _has(guess: TrialGuess, channels: frozenset[str]) -> bool:
     """Return whether a log has, or may have, one of some channels."""
-    named = {one.channel for one in guess.columns}
     asked = {one.key for one in guess.decisions}
-    in_trial = guess.trial.channels.keys() if guess.trial is not None else set()
-    return bool(channels & {*named, *asked, *in_trial})
+    return bool(channels & {*asked, *_channels(guess)})
+
+
+def _is_whole(channels: set[str]) -> bool:
+    return bool(channels & _STEERING and channels & _TURNING)
 
 
 def _to_decide(
@@ -201,35 +209,18 @@ def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
     from shipgym.errors import InputError
     from shipgym.trials.guesses import guess_trial
 
-    joined = _joined(logs)
-    if joined is not None:
-        return [joined]
     guessed = [guess_trial(logs[0])]
     for log in logs[1:]:
         try:
             guessed.append(guess_trial(log))
         except InputError as error:
             warn(f"{error}; left out of the ship file")
+    parts = [_channels(one) for one in guessed]
+    if not any(map(_is_whole, parts)) and _is_whole(set().union(*parts)):
+        joined = guess_trial(*(one.paths[0] for one in guessed))
+        if joined.trial is not None:
+            return [joined]
     return guessed
-
-
-def _joined(logs: list[Path]) -> TrialGuess | None:
-    """Files as one log where only all of them together steer and turn; or None."""
-    from shipgym.errors import InputError
-    from shipgym.trials.guesses import guess_columns, guess_trial
-    from shipgym.trials.readers.kinds import read_log
-
-    if len(logs) < 2:
-        return None
-    try:
-        found = [{one.channel for one in guess_columns(read_log(log))} for log in logs]
-        if any(one & _STEERING and one & _TURNING for one in found):
-            return None
-        joined = guess_trial(*logs)
-    except InputError:
-        return None
-    is_whole = _has(joined, _STEERING) and _has(joined, _TURNING)
-    return joined if is_whole and joined.trial is not None else None
 
 
 def _service_speed(guessed: list[TrialGuess]) -> float | None:

@@ -293,6 +293,10 @@ def candump(t, pgn, data):
     return f"({BEGIN + t:.6f}) can0 {can_id(pgn)}#{data.hex().upper()}"
 
 
+def candump_shown(t, pgn, data):
+    return f" ({BEGIN + t:.6f})  can0  {can_id(pgn)}   [8]  {data.hex(' ').upper()}"
+
+
 def yacht_devices(t, pgn, data):
     at = clock(t, "%H:%M:%S.000")
     return f"{at} R {can_id(pgn)} {data.hex(' ').upper()}"
@@ -310,7 +314,7 @@ def canboat_plain(t, pgn, data):
 @pytest.mark.parametrize("magnetic", [False, True])
 @pytest.mark.parametrize(
     "form",
-    [candump, yacht_devices, actisense, canboat_plain],
+    [candump, candump_shown, yacht_devices, actisense, canboat_plain],
 )
 def test_raw_frames_of_nmea_2000_are_decoded(form, magnetic, tmp_path):
     pytest.importorskip("nmea2000", reason="needs the extra nmea2000")

@@ -22,6 +22,7 @@ _JSON = re.compile(r"\{.*\"pgn\".*\}")
 _TEXT = re.compile(
     r"\d{4}-\d\d-\d\d\S+\s+\d\s+(\d+)\s+\d+\s+(\d{5,6}) [^:=]*:\s+(.*=.*)"
 )
+_CANDUMP = re.compile(r"can\d+\s+([0-9A-F]{8})(?:#|\s+\[\d\]\s+)([0-9A-F ]+)")
 
 
 class _Message(NamedTuple):
@@ -49,14 +50,16 @@ def hear_pgns(lines: Sequence[str], heard: Heard) -> None:
     for number, line in enumerate(lines, start=1):
         if "$" in line or '"updates"' in line:
             continue
-        is_raw = RAW_FRAME.search(line) is not None
-        if is_raw and decoder is None:
+        raw = RAW_FRAME.search(line)
+        if raw and decoder is None:
             module = library(
                 "nmea2000.decoder", "nmea2000", "which decodes raw NMEA 2000"
             )
-            decoder = module.NMEA2000Decoder(units="si")
+            known = [int(pgn) for pgn in _PGNS]
+            decoder = module.NMEA2000Decoder(units="si", include_pgns=known)
         try:
-            message = _decoded(decoder, line) if is_raw else _printed(line)
+            frame = line[raw.start() :].strip() if raw else ""
+            message = _decoded(decoder, frame) if raw else _printed(line)
         except (ValueError, LookupError, AttributeError):
             heard.damage(number)
             continue
@@ -77,9 +80,12 @@ def hear_pgns(lines: Sequence[str], heard: Heard) -> None:
         heard.hear(number, source, _channels(message, unit))
 
 
-def _decoded(decoder: Any, line: str) -> _Message | None:
+def _decoded(decoder: Any, frame: str) -> _Message | None:
     """The message of a raw frame; None until all frames of a longer one are there."""
-    decoded = decoder.decode(line.strip())
+    dumped = _CANDUMP.fullmatch(frame)
+    if dumped is not None:  # in each of its forms
+        frame = f"(0.0) can0 {dumped[1]}#{dumped[2].replace(' ', '')}"
+    decoded = decoder.decode(frame)
     if decoded is None:
         return None
     fields = {
