@@ -1,15 +1,14 @@
-"""Times as instruments write them, with or without a date, and time zones."""
+"""Times as instruments write them, with or without a date."""
 
 import re
 import warnings
 from collections.abc import Sequence
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 
 from shipgym.arrays import Floats, Integers
-from shipgym.errors import InputError
 
 DAY = 86400.0  # s
 _TIME_OF_DAY = re.compile(r"\d\d?:\d\d(:\d\d([.,]\d+)?)?")
@@ -24,22 +23,6 @@ def unit_since_1970(number: float) -> str | None:
     """Unit in which a number of that size counts from 1970; None for a small one."""
     fitting = (unit for size, unit in _SINCE_1970.items() if number >= size)
     return next(fitting, None)
-
-
-def zone_seconds(zone: str, where: str) -> float:
-    """Seconds that a clock is ahead of UTC, from a text such as "+02:00" or "UTC".
-
-    Raises InputError for another text.
-    """
-    suffix = "Z" if zone == "UTC" else zone
-    try:
-        ahead = datetime.fromisoformat(f"2000-01-01T00:00{suffix}").utcoffset()
-    except (ValueError, TypeError):
-        raise InputError(
-            f'{where}: expected how far the clock is ahead of UTC, as "+02:00", got'
-            f" {zone!r}"
-        ) from None
-    return (ahead or timedelta()).total_seconds()
 
 
 def read_clock(texts: Sequence[str]) -> Floats:

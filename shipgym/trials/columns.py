@@ -16,7 +16,6 @@ from shipgym.checks import (
     quoted,
 )
 from shipgym.errors import InputError
-from shipgym.trials.clock_texts import zone_seconds
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.units import QUANTITIES, check_channel, si_factor, si_unit
 
@@ -28,7 +27,6 @@ class Column:
     name: str  # of the column
     unit: str = ""  # none: as the reader knows it, else the SI unit
     date: str | None = None  # column of the date
-    zone: str = "UTC"  # how far the clock is ahead of UTC, as "+02:00"
     minus: str | None = None  # column that is subtracted: of the other propeller
     neutral: float = 0.0  # number of a steering command that steers straight
     full: float | None = None  # change of the command that counts as 35 deg of rudder
@@ -104,7 +102,7 @@ class Locator:
 
 #: Keys of the column of a channel, beside those of each.
 _KEYS = {
-    "t": ["date", "zone"],
+    "t": ["date"],
     "psi": ["quaternion"],
     "delta": ["minus", "neutral", "full"],
     "delta_command": ["minus", "neutral", "full"],
@@ -118,8 +116,8 @@ def parse_columns(
 
     Each entry is the name of a column or ``{"column": name, "unit": unit}``, with
     ``"file"``, its name, where several files of one log have that column. That of the
-    time may also have ``"date"``, the column of the date, and ``"zone"``, that of the
-    heading ``"quaternion"``, the columns of x, y and z beside that of w, that of the
+    time may also have ``"date"``, the column of the date, that of the heading
+    ``"quaternion"``, the columns of x, y and z beside that of w, that of the
     rudder ``"full"``, ``"neutral"`` and ``"minus"``, which make a steering command.
     `where` begins the messages. Raises InputError for an unknown channel, key or unit,
     a unit of another quantity, and a column that is given twice.
@@ -151,8 +149,6 @@ def _parse_column(channel: str, entry: Any, where: str) -> Column:
     check_text(name, where)
     if "unit" in fields:
         si_factor(channel, fields["unit"], where)
-    if "zone" in fields:
-        zone_seconds(check_text(fields["zone"], where), f"{where} zone")
     for key, value in fields.items():
         if key in ("neutral", "full"):
             fields[key] = check_number(value, f"{where} {key}")

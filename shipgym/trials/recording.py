@@ -46,7 +46,7 @@ class Recording:
     filled : dict of str to int
         How many values of a channel were filled in.
     start : float or None
-        Clock at t = 0 in UTC, s since 1970 or of the day; None where the time is no
+        Clock at t = 0, s since 1970 or of the day; None where the time is no
         clock's.
     notes : list of str
         What was left out, and what was assumed of the values.

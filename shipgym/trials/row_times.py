@@ -7,7 +7,7 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
-from shipgym.trials.clock_texts import DAY, read_clock, spread_evenly, zone_seconds
+from shipgym.trials.clock_texts import DAY, read_clock, spread_evenly
 from shipgym.trials.columns import Column
 from shipgym.trials.readers.cell_texts import is_number
 from shipgym.trials.readers.log_table import REPAIR, LogTable
@@ -33,7 +33,7 @@ class RowTimes(NamedTuple):
 
     t: Floats  # s
     unit: str  # in which messages name them
-    start: float | None  # of the clock at t = 0, UTC; None where it is no clock's
+    start: float | None  # of the clock at t = 0; None where it is no clock's
     notes: list[str]
 
 
@@ -60,8 +60,7 @@ def read_times(table: LogTable, column: Column) -> RowTimes:
         return RowTimes(clock, column.unit, start=None, notes=notes)
     known = clock[np.isfinite(clock)]
     zero = float(known[0]) if known.size else 0.0
-    ahead = zone_seconds(column.zone, str(table.path))
-    return RowTimes(clock - zero, unit="s", start=zero - ahead, notes=notes)
+    return RowTimes(clock - zero, unit="s", start=zero, notes=notes)
 
 
 def _time_cells(table: LogTable, column: Column) -> list[str]:

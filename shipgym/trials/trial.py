@@ -304,7 +304,7 @@ class Trial:
         columns : mapping of str to str or mapping, optional
             For each channel (``t`` included) its column, or ``{"column": name, "unit":
             unit}``. By default every column that is named like a channel, in SI units.
-            Of ``t`` also ``"date"`` and ``"zone"``.
+            Of ``t`` also ``"date"``.
         rudder_positive : {"starboard", "port"}
             Side to which a positive rudder angle of the file steers.
         velocity_frame : {"body", "earth"}

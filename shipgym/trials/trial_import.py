@@ -7,7 +7,6 @@ import numpy as np
 
 from shipgym.checks import quoted
 from shipgym.errors import InputError
-from shipgym.trials.clock_texts import zone_seconds
 from shipgym.trials.columns import Column
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.midship import to_project_conventions
@@ -112,12 +111,11 @@ def _on_first_clock(other: Recording, first: Recording, known: Signals) -> Signa
     begin, end = _span(known)
     other_begin, other_end = _span(moved)
     if other_begin >= end or other_end <= begin:
-        column = other.locator.columns["t"].name
         raise InputError(
             f"{path}: expected a file of the same time as the other of this log, got"
             f" one that begins {other_begin - begin:.6g} s after it and does not"
-            " overlap with it; name files that were written at the same time, or the"
-            f' zone of its clock: t = {{ column = "{column}", zone = "+02:00" }}'
+            " overlap with it; name files that were written at the same time, by clocks"
+            " of one zone"
         )
     return moved
 
@@ -187,7 +185,4 @@ def _complete(
             if count and name in log.channels:
                 log.repaired[name] = count
 
-    first = recordings[0]
-    if first.start is not None:
-        zone = first.locator.columns["t"].zone
-        log.start = first.start + zone_seconds(zone, log.where)
+    log.start = recordings[0].start
