@@ -126,11 +126,13 @@ def _print_verification(
     from agents.cli.terminal import console, say
     from identification.judging.warnings import held_out_error
 
-    say(held_out_error(result.identification))
-    console.print(tables.prediction_table(result.identification))
+    identification = result.identification
+    criteria = verification.criteria
+    say(held_out_error(identification))
+    console.print(tables.prediction_table(identification))
     console.print()
-    console.print(tables.criteria_table(verification.criteria))
-    say(*tables.criteria_notes(verification.criteria))
+    console.print(tables.criteria_table(criteria))
+    say(*tables.criteria_notes(criteria))
     console.print(f"\nunstable draws: {int(verification.unstable.sum())} of {draws}\n")
     console.print(tables.ranking_table(result))
     console.print()

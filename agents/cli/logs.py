@@ -209,15 +209,18 @@ def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
     from shipgym.errors import InputError
     from shipgym.trials.guesses import guess_trial
 
-    guessed = [guess_trial(logs[0])]
-    for log in logs[1:]:
+    first, *others = logs
+    guessed = [guess_trial(first)]
+    for log in others:
         try:
             guessed.append(guess_trial(log))
         except InputError as error:
             warn(f"{error}; left out of the ship file")
     parts = [_channels(one) for one in guessed]
-    if not any(map(_is_whole, parts)) and _is_whole(set().union(*parts)):
-        joined = guess_trial(*(one.paths[0] for one in guessed))
+    together = set().union(*parts)
+    if not any(map(_is_whole, parts)) and _is_whole(together):
+        paths = [one.paths[0] for one in guessed]
+        joined = guess_trial(*paths)
         if joined.trial is not None:
             return [joined]
     return guessed

@@ -89,12 +89,15 @@ def _side(value: float, evidence: str, *, is_sure: bool) -> RudderSide:
 
 def check_rudder_side(log: Log) -> None:
     """Refuse a rudder that is positive to port, by the turning that follows it."""
-    if not log.has("delta") or not (log.has("psi") or log.has("r")):
+    channels = log.channels
+    is_turning = log.has("psi") or log.has("r")
+    if not log.has("delta") or not is_turning:
         return
-    psi = log.channels.get("psi")
+    psi = channels.get("psi")
     if psi is None:
-        psi = integral(log.t, log.channels["r"])
-    found = rudder_side(log.t, psi, log.channels["delta"])
+        psi = integral(log.t, channels["r"])
+    delta = channels["delta"]
+    found = rudder_side(log.t, psi, delta)
     if found.side == "port" and found.is_sure:
         raise InputError(
             f"{log.where}: expected a positive rudder to turn the bow to starboard, got"

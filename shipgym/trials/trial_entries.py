@@ -78,7 +78,8 @@ def read_entries(
         where = f"{path}: [[trials]] {number}"
         check_table(table, where, _KEYS)
         place = f"{where} sensors"
-        own_sensors = check_table(table.get("sensors", {}), place)
+        own_sensors = table.get("sensors", {})
+        check_table(own_sensors, place)
         own_columns = parse_columns(table.get("columns", {}), f"{where} columns")
         own_words = {key: table[key] for key in _CONVENTIONS if key in table}
         entry = _read_entry(

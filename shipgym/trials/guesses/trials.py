@@ -246,15 +246,17 @@ def _unknown_units(columns: dict[str, ColumnGuess]) -> list[Decision]:
     decisions = []
     unknown = [one for one in columns.values() if one.unit == UNKNOWN]
     for guess in unknown:
-        del columns[guess.channel]
-        if guess.channel not in _NEEDED:
+        channel = guess.channel
+        del columns[channel]
+        if channel not in _NEEDED:
             continue
-        unit = f'unit = "{si_unit(guess.channel)}" }} where that is its unit'
-        if guess.channel in RUDDERS:
+        usual = si_unit(channel)
+        unit = f'unit = "{usual}" }} where that is its unit'
+        if channel in RUDDERS:
             unit = "full = 100 } where 100 of it are 35 deg of rudder"
         name = json.dumps(guess.name, ensure_ascii=False)
         choices = (
             f"column {name}, whose unit {guess.reason}: {{ column = {name}, {unit}"
         )
-        decisions.append(Decision("columns", guess.channel, choices))
+        decisions.append(Decision("columns", channel, choices))
     return decisions

@@ -47,15 +47,18 @@ def check_over_ground(
     is_known = bool(conventions.installation.heading_offset)
     psi = log.channels["psi"][moving]
     course = np.angle(velocity[moving])
-    agreement = abs(np.exp(1j * (course - psi)).mean())
-    mirrored = np.exp(1j * (course + psi)).mean()
+    apart = course - psi
+    agreement = abs(np.exp(1j * apart).mean())
+    sum_of_both = course + psi
+    mirrored = np.exp(1j * sum_of_both).mean()
     is_turning = np.ptp(psi) > 20.0 * DEGREE
     if is_turning and abs(mirrored) > max(0.95, agreement + 0.02):
         raise _mirrored(mirrored, conventions, locator)
     fault = _heading_fault(psi, course, offset_is_known=is_known)
     if fault:
         raise InputError(f"{locator.path}: expected a heading {fault}")
-    if is_known or "mag" not in locator.columns["psi"].name.lower():
+    name = locator.columns["psi"].name.lower()
+    if is_known or "mag" not in name:
         return []
     return [
         "the heading is magnetic by its name; write what it shows too much as"

@@ -158,11 +158,11 @@ def _numbers(kind: str, fields: Sequence[str]) -> dict[str, float]:
 
     Raises ValueError where one is broken.
     """
-    numbers = {
-        channel: _number(fields, place)
-        for channel, place in _NUMBERS[kind].items()
-        if fields[place.at] and place.counts(fields)
-    }
+    numbers = {}
+    for channel, place in _NUMBERS[kind].items():
+        is_there = fields[place.at] != ""
+        if is_there and place.counts(fields):
+            numbers[channel] = _number(fields, place)
     # a heading by compass with its deviation, and true if the variation is known
     deviation = numbers.pop("deviation", 0.0)
     if "psi_magnetic" in numbers:

@@ -131,13 +131,13 @@ def _number(text: Any) -> float | None:
 
 def _angle_unit(messages: Iterable[_Message]) -> str:
     """Unit of angles without one: rad where headings and courses are that small."""
-    without_unit = [
-        _number(value) or 0.0
-        for message in messages
-        for name, (value, unit) in message.fields.items()
-        if name in ("heading", "cog") and not unit
-    ]
-    return "rad" if 0.0 < max(without_unit, default=0.0) < 6.3 else "deg"
+    largest = 0.0
+    for message in messages:
+        for name in ("heading", "cog"):
+            value, unit = message.fields.get(name, (None, ""))
+            if not unit:
+                largest = max(largest, _number(value) or 0.0)
+    return "rad" if 0.0 < largest < 6.3 else "deg"
 
 
 def _channels(message: _Message, angle_unit: str) -> dict[str, float]:
