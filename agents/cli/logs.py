@@ -58,28 +58,28 @@ def new_ship_command(
     ship_file = render("shipgym.pages/ship.toml.jinja", **facts)
     write_text(ship_file, out)
 
-    side = facts["side"]
     read = [one.trial for one in guessed if one.trial is not None]
     notes = list(dict.fromkeys(note for trial in read for note in trial.notes))
-    first, *_ = guessed
-    answer(
-        {
-            "written": str(out),
-            "columns": {
-                one.channel: {"column": one.name, "unit": one.unit}
-                for one in first.columns
-            },
-            "unused": first.unused,
-            "rudder_positive": side.side if side else None,
-            **{one.name: one.value for one in facts["conventions"]},
-            "to_decide": facts["to_decide"],
-            "notes": notes,
-        }
-    )
+    answer({"written": str(out), **_fields(guessed[0], facts), "notes": notes})
     summary = render("shipgym.pages/new_ship.txt.jinja", **facts)
     say(summary.strip())
     for note in notes:
         warn(note)
+
+
+def _fields(first: TrialGuess, facts: dict[str, Any]) -> dict[str, Any]:
+    """What was guessed, for a program that reads it."""
+    side = facts["side"]
+    columns = {}
+    for one in first.columns:
+        columns[one.channel] = {"column": one.name, "unit": one.unit}
+    return {
+        "columns": columns,
+        "unused": first.unused,
+        "rudder_positive": side.side if side else None,
+        **{one.name: one.value for one in facts["conventions"]},
+        "to_decide": facts["to_decide"],
+    }
 
 
 def _facts(guessed: list[TrialGuess], out: Path) -> dict[str, Any]:

@@ -51,5 +51,6 @@ def set_and_drift(north: float, east: float) -> str:
     speed = math.hypot(north, east)
     knots = speed / KNOT
     bearing = math.atan2(east, north)
-    towards = math.degrees(bearing) % 360.0
+    degrees = math.degrees(bearing)
+    towards = degrees % 360.0
     return f"{speed:.2f} m/s ({knots:.2f} knots) towards {towards:03.0f} deg"

@@ -63,7 +63,8 @@ def rudder_side(t: Floats, psi: Floats, delta: Floats) -> RudderSide:
         return _side(turned, evidence, is_sure=True)
     windows = _windows(t, psi, delta)
     low, high = np.quantile(delta, [0.02, 0.98])
-    if high - low <= 2.0 * DEGREE or windows.shape[1] < _FEWEST_WINDOWS:
+    swing = high - low
+    if swing <= 2.0 * DEGREE or windows.shape[1] < _FEWEST_WINDOWS:
         return RudderSide(None)
 
     # of stable ships, and of one that is not
@@ -73,13 +74,14 @@ def rudder_side(t: Floats, psi: Floats, delta: Floats) -> RudderSide:
     fits = [_fit(times, headings, rudders, damping) for damping in dampings]
     best = min(fits, key=lambda fit: fit.squares)
     as_good = [fit for fit in fits if fit.squares < 1.05 * best.squares]
-    agree = all(fit.certainty * best.certainty > 0.0 for fit in as_good)
-    errors = abs(best.certainty)
+    certainty = best.certainty
+    agree = all(fit.certainty * certainty > 0.0 for fit in as_good)
+    errors = abs(certainty)
     if not agree or not best.is_clear or errors <= 5.0:
         return RudderSide(None)
     evidence = f"the turning that follows the rudder, {errors:.0f} standard errors"
     # twice the errors of a guess: a refusal has to be right
-    return _side(best.certainty, evidence, is_sure=errors > 10.0)
+    return _side(certainty, evidence, is_sure=errors > 10.0)
 
 
 def _side(value: float, evidence: str, *, is_sure: bool) -> RudderSide:

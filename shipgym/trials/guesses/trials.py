@@ -228,7 +228,8 @@ def _ask_for_missing(guess: TrialGuess) -> None:
 
 def _rudder_side(guess: TrialGuess, trial: Trial) -> RudderSide | None:
     """Side of the rudder by its letters or its turning; None without it or heading."""
-    rudder = trial.channels.get("delta", trial.channels.get("delta_command"))
+    command = trial.channels.get("delta_command")
+    rudder = trial.channels.get("delta", command)
     if "psi" not in trial or rudder is None:
         return None
     names = {one.name for one in guess.columns if one.channel in RUDDERS}

@@ -153,11 +153,14 @@ def frozen_heading(log: Log) -> list[str]:
     psi = log.channels["psi"]
     delta = log.channels["delta"]
     is_over = np.abs(delta) > 5.0 * DEGREE
-    is_frozen = (np.abs(np.diff(psi)) < 1e-9) & is_over[1:]
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_frozen, [False]])))
+    stands = np.abs(np.diff(psi)) < 1e-9
+    is_frozen = stands & is_over[1:]
+    padded = np.concatenate([[False], is_frozen, [False]])
+    edges = np.flatnonzero(np.diff(padded))
     begins = log.t[edges[::2]]
     ends = log.t[edges[1::2]]
-    is_long = (ends - begins >= shortest) & (np.diff(edges)[::2] >= 10)
+    samples = np.diff(edges)[::2]
+    is_long = (ends - begins >= shortest) & (samples >= 10)
     if not is_long.any():
         return []
     k = int(np.argmax(np.where(is_long, ends - begins, 0.0)))

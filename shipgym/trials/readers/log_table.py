@@ -175,7 +175,8 @@ class LogTable:
     def _odd_times(self, name: str) -> list[int]:
         """Rows whose time is missing, or is neither a number nor a clock time."""
         numbers, odd = self._parse(name)
-        missing = np.flatnonzero(np.isnan(numbers)).tolist()
+        is_missing = np.isnan(numbers)
+        missing = np.flatnonzero(is_missing).tolist()
         if len(odd) <= ODD_SHARE * len(numbers):
             return missing
         texts = self.texts(name)  # clock times
