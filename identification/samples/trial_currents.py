@@ -71,8 +71,9 @@ def without_current(
     currents = currents_of(trials, length=length, speed=speed, option=option)
     rows: dict[str, Any] = {}
     doubtful: dict[str, list[str]] = {}
+    alike: list[str] = []
     for name, current in currents.items():
-        doubt = _doubt(current, speed, one_heading)
+        doubt = _doubt(current, speed)
         if doubt and current.covariance is None:
             raise InputError(
                 f"trial {name!r}: no current can be removed: {doubt}; give it in m/s,"
@@ -83,7 +84,9 @@ def without_current(
         taken_out = not doubt and current.probability <= SIGNIFICANT
         if taken_out:
             found[name] = through_water(found[name], *current.velocity)
-        rows[name] = _row(current, taken_out, one_heading)
+            if one_heading and current.covariance is not None:
+                alike.append(PurePath(name).name)
+        rows[name] = _row(current, taken_out)
     magnetic = [PurePath(t.name).name for t in trials if t.over_ground and t.magnetic]
     if magnetic:
         doubt = (
@@ -93,11 +96,17 @@ def without_current(
         doubtful[doubt] = magnetic
     for doubt, names in doubtful.items():
         remarks.append(f"{', '.join(names)}: no current is removed: {doubt}; {REMEDY}")
+    if alike:
+        remarks.append(
+            f"{', '.join(alike)}: a current is removed though the trials keep to one"
+            " heading, on which the drift of the ship herself looks the same; where the"
+            ' water stood still, take none out (current = "none")'
+        )
     return rows
 
 
-def _row(current: TrialCurrent, taken_out: bool, one_heading: bool) -> dict[str, Any]:
-    """A current for the provenance; how certain it is, unless from one heading."""
+def _row(current: TrialCurrent, taken_out: bool) -> dict[str, Any]:
+    """A current for the provenance, and how certain it is."""
     north, east = current.mean.tolist()
     row = {
         "north": north,
@@ -105,19 +114,16 @@ def _row(current: TrialCurrent, taken_out: bool, one_heading: bool) -> dict[str,
         "source": current.source,
         "taken_out": taken_out,
     }
-    if current.covariance is not None and not one_heading:
+    if current.covariance is not None:
         errors = np.sqrt(np.diag(current.covariance))
         row["standard_errors"] = errors.tolist()
         row["probability"] = current.probability
     return row
 
 
-def _doubt(current: TrialCurrent, speed: float, one_heading: bool) -> str:
+def _doubt(current: TrialCurrent, speed: float) -> str:
     """Reason why a current cannot be removed; empty where it can."""
     if current.covariance is not None:
-        # drift by the current and drift by the ship's own neutral helm look the same
-        if one_heading:
-            return "the trials keep to one heading"
         errors = np.sqrt(np.diag(current.covariance))
         largest_error = errors.max()
         if largest_error > 0.05 * speed:

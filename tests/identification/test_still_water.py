@@ -126,18 +126,29 @@ def test_currents_that_cannot_be(
     mariner: ShipModel, logs: list[Trial], option, which, said
 ) -> None:
     with pytest.raises(InputError, match=said):
-        in_still_water([logs[k] for k in which], mariner.particulars, option)
+        identify(
+            [logs[k] for k in which],
+            "nomoto",
+            particulars=mariner.particulars,
+            current=option,
+        )
 
 
-def test_one_heading_is_left_as_it_is_with_a_word(
+def test_a_current_on_one_heading_is_taken_out_with_a_word(
     mariner: ShipModel, logs: list[Trial]
 ) -> None:
+    """Where the water stands still nothing is taken out."""
     (found,), report = in_still_water([logs[1]], mariner.particulars)
-    assert found is logs[1]
-    assert "zigzag: no current is removed: the trials keep" in report["sea_remarks"][0]
     (row,) = report["currents"].values()
-    assert not {"standard_errors", "probability"} & row.keys()
-    assert sea_sentences(report)[0].endswith("left in")
+    errors = np.array([row["north"] - NORTH, row["east"] - EAST])
+    assert row["taken_out"]
+    assert np.all(np.abs(errors) < 3.0 * np.array(row["standard_errors"]))
+    assert not found.over_ground
+    assert "though the trials keep to one heading" in report["sea_remarks"][0]
+    calm = log(zigzag(mariner, 20, 20, duration=500.0, dt=0.5))
+    (found,), report = in_still_water([calm], mariner.particulars)
+    assert found is calm
+    assert "sea_remarks" not in report
 
 
 def test_measured_wind_is_taken_out(mariner: ShipModel) -> None:
