@@ -20,7 +20,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from agents.controllers.controller import Bounds, Controller
-from agents.controllers.guided import with_path
+from agents.controllers.guided import bend, with_path
 from agents.controllers.law import (
     HelmMemory,
     Nothing,
@@ -32,12 +32,7 @@ from agents.controllers.law import (
 )
 from agents.controllers.lq import LQ
 from agents.controllers.memory import selected
-from agents.controllers.path_ahead import FAR, PathAhead, Place, turned
-from agents.controllers.wheel_over import (
-    WheelOver,
-    WheelOverSettings,
-    course_over_ground,
-)
+from agents.controllers.wheel_over import WheelOver, WheelOverSettings
 from agents.settings import Settings, Step, setting
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
@@ -53,6 +48,7 @@ KNOT_STEPS = int(STEPS_PER_LENGTH)  # control intervals from one knot to the nex
 COARSE = 2  # control intervals in a step of the simulation
 CANDIDATES, ELITES, ROUNDS = 16, 4, 2
 DEEP = 1e6  # m, of water that is not shallow
+FAR = 1e9
 
 
 class BodyCurrent(NamedTuple):
@@ -337,55 +333,37 @@ def added(plans: Floats, at: Any) -> Floats:
 class DesignModels:
     """Design models from where ships are observed, in a steady current.
 
-    LQ steers them to courses over ground.
+    LQ steers them to courses over ground. Their places are kept along and across the
+    path, whose course is 0 where the ships observed it.
 
     Attributes
     ----------
     dt : float
         Step, s.
-    place : Place
-        Where they are on the path.
-    rudder : array of shape (n,)
-        rad.
+    along, cross_track : array of shape (n,)
+        Places, m.
     progress : array of shape (n,)
         Along the path in the last step, m.
     moved : array of shape (n,)
         Way of the rudder in the last step, rad.
     """
 
-    place: Place
-    rudder: Floats
     progress: Floats
     moved: Floats
 
     def __init__(self, guide: MPC, seen: PathSignals, current: BodyCurrent) -> None:
         self.guide = guide
         self.dt = COARSE * guide.design["dt"]
-        self.time = 0.0
-        self.feedback = guide.autopilot.linear_feedback
-        self.crab_share = guide.gains["crab_share"]
-        self.rudder_limit = guide.ship.steering.limit
-        self.path = PathAhead(seen.turns, guide.gains["path_radius"])
-
-        to_path = seen.heading_error
-        self.north, self.east = turned(current.ahead, current.aside, to_path)
-        n = len(to_path)
-        self.engine = _engine(
-            guide.ship,
-            n=n,
-            dt=self.dt,
-            depth=guide.design["water_depth"],
-        )
-        seeds = np.zeros(n, dtype=np.int64)
-        self.engine.reset(seeds)
-        self._begin(seen)
-        self._observe()
-
-    def _begin(self, seen: PathSignals) -> None:
-        """Put the models where the ships are, the path to the north."""
+        self.turns = seen.turns
+        self.north, self.east = turned(current.ahead, current.aside, seen.heading_error)
+        self.cross_track = seen.cross_track
+        self.along = np.zeros_like(seen.cross_track)
+        n = len(self.along)
+        self.engine = _engine(guide.ship, n, self.dt, guide.design["water_depth"])
+        self.engine.reset(np.zeros(n, dtype=np.int64))
         start = {
-            "x": np.zeros_like(seen.cross_track),
-            "y": seen.cross_track,
+            "x": self.along,
+            "y": self.along,
             "psi": -seen.heading_error,
             "u": seen.surge,
             "v": seen.sway,
@@ -399,40 +377,50 @@ class DesignModels:
         """A state of the models."""
         return self.engine.read(name)
 
-    def _observe(self) -> None:
-        """Read where the models are; the current has carried them along."""
-        x = self.read("x") + self.north * self.time
-        y = self.read("y") + self.east * self.time
-        self.place = self.path.fix(x, y)
-        self.rudder = self.read("delta")
+    def path_course(self, ahead: Any) -> Floats:
+        """Course of the path so far ahead of the ships, m; rad."""
+        radius = self.guide.gains["path_radius"]
+        course: Floats = bend(self.along + ahead, self.turns, radius)
+        return course
 
     def wheel_over_course(self) -> Floats:
         """Course over ground that wheel-over steers, rad."""
-        place = self.place
         gains = self.guide.parameters
-        course = course_over_ground(place.cross_track, place.turns, gains)
-        over_ground: Floats = place.course + course
-        return over_ground
+        back: Floats = np.arctan2(self.cross_track, gains.lookahead)
+        return self.path_course(gains.turn_reach) - back
 
     def steer(self, course: Floats) -> None:
         """Take one step towards a course over ground."""
-        place_before = self.place
-        rudder_before = self.rudder
-
-        crab = self.crab_share * self.drift()
+        before = {name: self.read(name) for name in ("x", "y", "delta")}
+        crab = self.guide.gains["crab_share"] * self.drift()
         seen = self.signals(course - crab)
-        order, _ = linear_law(seen, self.helm(), self.feedback)
-        self.engine.command[0] = np.clip(order / self.rudder_limit, -1.0, 1.0)
+        feedback = self.guide.autopilot.linear_feedback
+        order, _ = linear_law(seen, self.helm(), feedback)
+        limit = self.guide.ship.steering.limit
+        self.engine.command[0] = np.clip(order / limit, -1.0, 1.0)
         self.engine.advance()
-        self.time += self.dt
 
-        self._observe()
-        self.progress = self.place.along_track - place_before.along_track
-        self.moved = np.abs(self.rudder - rudder_before)
+        self.moved = np.abs(self.read("delta") - before["delta"])
+        self._move(
+            north=self.read("x") - before["x"] + self.north * self.dt,
+            east=self.read("y") - before["y"] + self.east * self.dt,
+        )
+
+    def _move(self, north: Floats, east: Floats) -> None:
+        """Move along and across the path by a way over ground, m."""
+        way = np.hypot(north, east)
+        ahead, aside = turned(north, east, self.path_course(0.5 * way))
+        bent = self.path_course(way) - self.path_course(0.0)
+        curvature = bent / np.maximum(way, 1e-9)
+        # inside of an arc the same way goes by more of it
+        shorter = np.maximum(1.0 - curvature * self.cross_track, 0.2)
+        self.progress = ahead / shorter
+        self.along = self.along + self.progress
+        self.cross_track = self.cross_track + aside
 
     def helm(self) -> HelmMemory:
         """Memory of LQ, which knows the rudder by its model of the gear."""
-        zero = np.zeros_like(self.rudder)
+        zero = np.zeros_like(self.along)
         return HelmMemory(zero, zero, zero, zero, zero, zero, started=zero)
 
     def drift(self) -> Floats:
@@ -440,25 +428,27 @@ class DesignModels:
         surge = self.read("u")
         sway = self.read("v")
         ahead, aside = turned(self.north, self.east, self.read("psi"))
-        ground_ahead = surge + ahead
-        ground_aside = sway + aside
-        across = surge * aside - sway * ahead
-        along = surge * ground_ahead + sway * ground_aside
-        drift: Floats = np.arctan2(across, along)
-        return drift
+        over_ground = np.arctan2(sway + aside, surge + ahead)
+        return np.asarray(wrapped(over_ground - np.arctan2(sway, surge)))
 
     def signals(self, to_steer: Floats) -> Signals:
         """Signals for LQ, which steers a heading, rad."""
-        zero = np.zeros_like(to_steer)
+        rudder = self.read("delta")
         return Signals(
             sway=self.read("v"),
             yaw_rate=self.read("r"),
             heading_error=wrapped(to_steer - self.read("psi")),
-            rudder=self.rudder,
-            heading_error_integral=zero,
+            rudder=rudder,
+            heading_error_integral=np.zeros_like(to_steer),
             surge=self.read("u"),
-            last_order=self.rudder,
+            last_order=rudder,
         )
+
+
+def turned(ahead: Number, aside: Number, angle: Number) -> tuple[Number, Number]:
+    """Vector in axes turned to starboard by an angle, rad."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return ahead * cosine + aside * sine, aside * cosine - ahead * sine
 
 
 def add_step_cost(cost: Floats, guide: MPC, models: DesignModels) -> None:
@@ -466,12 +456,12 @@ def add_step_cost(cost: Floats, guide: MPC, models: DesignModels) -> None:
     weights = guide.costs
     particulars = guide.ship.particulars
     full_way = particulars["speed"] * models.dt
-    off_track = models.place.cross_track / weights.corridor
+    off_track = models.cross_track / weights.corridor
     share_of_way = models.progress / full_way
     rudder_rate = models.moved * particulars["length"] / full_way
 
     cost += off_track**2 - np.clip(share_of_way, -1.0, 1.0)
-    cost += weights.rudder * models.rudder**2
+    cost += weights.rudder * models.read("delta") ** 2
     cost += weights.rudder_travel / COARSE * models.moved
     cost += weights.rudder_rate * rudder_rate**2
     if weights.roll > 0.0:

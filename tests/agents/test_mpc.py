@@ -7,7 +7,7 @@ import pytest
 
 from agents import MPC, WheelOver, check_controller, load_agent
 from agents.controllers.law import Turns
-from agents.controllers.path_ahead import PathAhead
+from agents.controllers.mpc import BodyCurrent, DesignModels
 from agents.rollouts.rollout import episode_costs
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
@@ -50,19 +50,28 @@ def test_to_port_it_does_what_it_does_to_starboard():
 
 
 @pytest.mark.parametrize("degrees", [60.0, 90.0, 120.0])
-def test_arcs_end_after_their_angle_also_beyond_a_right_angle(degrees):
-    radius, angle = 100.0, np.radians(degrees)
-    one, other = np.ones(1), np.zeros(1)
-    path = PathAhead(Turns(50.0 * one, angle * one, other, other), radius)
-    for swept in np.linspace(0.0, angle, 20):
-        x, y = 50.0 + radius * np.sin(swept), radius * (1.0 - np.cos(swept))
-        place = path.fix(x * one, y * one)
-        assert place.course == pytest.approx([swept], abs=1e-9)
-        assert place.cross_track == pytest.approx([0.0], abs=1e-9)
-    x, y = x + 70.0 * np.cos(angle), y + 70.0 * np.sin(angle)
-    place = path.fix(x * one, y * one)
-    assert place.course == pytest.approx([angle])
-    assert place.along_track == pytest.approx([50.0 + radius * angle + 70.0])
+def test_a_ship_that_sails_the_path_is_on_it_beyond_a_right_angle_too(degrees):
+    """An arc ends after its angle; beside it the way along is shorter inside."""
+    guide = MPC.from_model(MARINER)
+    radius, angle, step = guide.gains["path_radius"], np.radians(degrees), 10.0
+    seen = guide.path_signals(np.zeros((3, len(guide.observation_names))))
+    one, zero = np.ones(3), np.zeros(3)
+    aside = np.array([0.0, 100.0, -100.0])
+    seen = seen._replace(
+        cross_track=aside,
+        heading_error=zero,
+        turns=Turns(50.0 * one, angle * one, 1e6 * one, zero),
+    )
+    models = DesignModels(guide, seen, BodyCurrent(zero, zero))
+    length = 50.0 + radius * angle + 200.0
+    for along in np.arange(0.0, length, step):
+        heading = np.clip((along + 0.5 * step - 50.0) / radius, 0.0, angle)
+        is_bent = 0.0 < heading < angle
+        way = step * (1.0 - is_bent * aside / radius)
+        models._move(way * np.cos(heading), way * np.sin(heading))
+    assert models.cross_track == pytest.approx(aside, abs=1.0)
+    assert models.along == pytest.approx(along + step, abs=3.0)
+    assert models.path_course(0.0) == pytest.approx(angle)
 
 
 def test_in_a_current_its_search_is_worth_something_though_it_is_told_of_none():
