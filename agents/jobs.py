@@ -33,7 +33,7 @@ from shipgym.errors import InputError
 from shipgym.extras import library
 from shipgym.python_files import working_folder
 
-__all__ = ["HERE", "EngineError", "JobEngine", "JobError", "run_jobs"]
+__all__ = ["HERE", "JobEngine", "JobError", "run_jobs"]
 
 #: Called with the number of jobs done and their total.
 JobProgress = Callable[[int, int], None]
@@ -43,10 +43,6 @@ Finished = Iterator[tuple[str, str]]
 
 class JobError(RuntimeError):
     """A job failed, not by wrong input, or its worker was killed."""
-
-
-class EngineError(InputError):
-    """Ray is not installed or does not answer, so that no job can run."""
 
 
 @dataclass(frozen=True)
@@ -244,10 +240,7 @@ def _connected_ray(where: JobEngine) -> Iterator[Any]:
     """Ray, connected, as a backend of joblib; what is started here ends here."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        try:
-            ray = library("ray", "ray", "engine 'ray' needs it")
-        except InputError as error:
-            raise EngineError(str(error)) from None
+        ray = library("ray", "ray", "engine 'ray' needs it")
         import_module("ray.util.joblib").register_ray()
     if ray.is_initialized():
         yield ray
@@ -263,7 +256,7 @@ def _connected_ray(where: JobEngine) -> Iterator[Any]:
         with _environment({"PYTHONPATH": paths}), chdir(root):
             ray.init(**options)
     except Exception as error:
-        raise EngineError(f"engine: 'ray' does not start: {error}") from None
+        raise InputError(f"engine: 'ray' does not start: {error}") from None
     try:
         yield ray
     finally:

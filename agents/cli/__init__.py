@@ -25,7 +25,6 @@ try:
     from agents.cli.command import (
         FAILED,
         INTERRUPTED,
-        CommandGroup,
         report_os_error,
         shared_options,
     )
@@ -43,7 +42,6 @@ except KeyboardInterrupt:  # Ctrl-C before any command began
     sys.exit(130)
 
 app = typer.Typer(
-    cls=CommandGroup,
     epilog=(
         "Example: shipgym new-ship zigzag.csv, then shipgym autopilot ship.toml --out"
         " report/"

@@ -11,7 +11,6 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 from typer import Argument, Option
-from typer.core import TyperGroup
 
 from agents.cli.parameters import take_parameters, typed_parameters
 
@@ -120,27 +119,3 @@ def fail(message: str, code: int) -> NoReturn:
 
     print_error(message)
     raise typer.Exit(code) from None
-
-
-class CommandGroup(TyperGroup):
-    """The commands; an empty argument is refused before any of them runs."""
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Refuse an unknown command, with the nearest that exists."""
-        from shipgym.checks import did_you_mean
-
-        name = args[0]
-        if name not in self.commands:
-            near = did_you_mean(name, self.commands)
-            known = ", ".join(self.commands)
-            ctx.fail(f"No such command '{name}'.{near} Commands: {known}")
-        return super().resolve_command(ctx, args)
-
-    def parse_args(self, ctx: Any, args: list[str]) -> Any:
-        """Refuse arguments that are empty."""
-        for before, text in zip(["argument", *args], args, strict=False):
-            name, sign, value = text.partition("=")
-            if not text or (sign and not value and name.startswith("--")):
-                option = name or (before if before.startswith("-") else "argument")
-                ctx.fail(f"{option}: expected a non-empty string, got ''")
-        return super().parse_args(ctx, args)

@@ -39,8 +39,13 @@ def export_command(
     ] = inf,
 ) -> None:
     """Write an autopilot or a ship model as C99 or FMU, a learned policy as ONNX."""
+    from agents.agent_file import load_agent
     from agents.cli.terminal import answer, say, warn
+    from agents.export.fmu import write_fmu
+    from agents.output import whole_folder
+    from agents.policies.onnx_export import onnx_model
     from shipgym.errors import InputError
+    from shipgym.files import write_bytes
 
     has_source = c is not None or fmu is not None
     if onnx is None and not has_source:
@@ -51,50 +56,22 @@ def export_command(
         raise InputError(
             "--name, --depth: expected with --c or --fmu, got neither; leave them out"
         )
+    graph = onnx_model(load_agent(what)) if onnx is not None else None
     source = _source(what, name, depth) if has_source else None
     for note in source.notes if source else ():
         warn(note)
-    _write(what, source, c=c, fmu=fmu, onnx=onnx)
+    if source is not None and fmu is not None:
+        write_fmu(source, fmu)
+    if graph is not None and onnx is not None:
+        write_bytes(graph.SerializeToString(), onnx)
+    if source is not None and c is not None:
+        files = {f"{source.name}.h": source.header, f"{source.name}.c": source.source}
+        with whole_folder(c, files) as draft:
+            for file_name, text in files.items():
+                (draft / file_name).write_text(text, encoding="utf-8")
     written = [str(path) for path in (onnx, c, fmu) if path is not None]
     answer({"written": written})
     say(*(f"written: {path}" for path in written))
-
-
-def _write(
-    what: str,
-    source: Source | None,
-    *,
-    c: Path | None,
-    fmu: Path | None,
-    onnx: Path | None,
-) -> None:
-    """Check all files before any is written; write first what may still fail."""
-    from agents.agent_file import load_agent
-    from agents.export.fmu import check_fmu_name, write_fmu
-    from agents.output import check_file, check_folder, whole_folder
-    from agents.policies.onnx_export import onnx_model
-    from shipgym.files import write_bytes
-
-    texts = {}
-    if source is not None:
-        texts = {f"{source.name}.h": source.header, f"{source.name}.c": source.source}
-    if fmu is not None:
-        check_fmu_name(fmu)
-    for file in (fmu, onnx):
-        if file is not None:
-            check_file(file)
-    if c is not None:
-        check_folder(c, texts)
-
-    graph = onnx_model(load_agent(what)) if onnx is not None else None
-    if fmu is not None and source is not None:
-        write_fmu(source, fmu)
-    if onnx is not None and graph is not None:
-        write_bytes(graph.SerializeToString(), onnx)
-    if c is not None:
-        with whole_folder(c, texts) as draft:
-            for file_name, text in texts.items():
-                (draft / file_name).write_text(text, encoding="utf-8")
 
 
 def _source(what: str, name: str | None, depth: float) -> Source:

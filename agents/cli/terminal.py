@@ -93,8 +93,8 @@ def print_error(message: str) -> None:
     err.print(Text.assemble(("error: ", "bold red"), message), soft_wrap=True)
 
 
-def _bars(name: str, *more: str) -> Bars:
-    """Bars on standard error: fields of a task, a bar, its share and remaining time."""
+def _bars() -> Bars:
+    """Bars on standard error: what is done, a bar, its share and remaining time."""
     from rich.progress import (
         BarColumn,
         Progress,
@@ -103,14 +103,13 @@ def _bars(name: str, *more: str) -> Bars:
         TimeRemainingColumn,
     )
 
-    columns = (
-        TextColumn(f"{{{name}}}", markup=False),
+    return Progress(
+        TextColumn("{task.description:<30}", markup=False),
         BarColumn(bar_width=32),
         TaskProgressColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
+        console=err,
     )
-    ends = [TextColumn(f"{{{field}}}", markup=False) for field in more]
-    return Progress(*columns, *ends, console=err)
 
 
 @contextmanager
@@ -127,7 +126,7 @@ def progress_bars() -> Iterator[Progress | None]:
     if not err.is_terminal:
         yield _line_a_minute()
         return
-    with _bars("task.description:<30") as bars:
+    with _bars() as bars:
         tasks: dict[str, Any] = {}
 
         def on_progress(stage: str, done: int, total: int) -> None:
@@ -168,33 +167,21 @@ def identifying(stage: str) -> Iterator[None]:
 
 @contextmanager
 def training_bar() -> Iterator[Callable[[TrainingProgress], None] | None]:
-    """Progress of a training: a bar, or off a terminal a line for each evaluation.
+    """Progress of a training: a bar, and a line for each evaluation.
 
     Yields a function that is called with the progress; None where nothing is shown.
     """
-    if console.quiet:
-        yield None
-        return
-    if not err.is_terminal:
-        yield _print_evaluation
-        return
-    with _bars("task.description", "task.fields[costs]") as bars:
-        task = bars.add_task("training", total=None, costs="")
+    with progress_bars() as bars:
 
         def on_progress(now: TrainingProgress) -> None:
-            bars.update(task, completed=now.steps, total=now.total, costs=_costs(now))
+            if bars is not None:
+                bars("training", now.steps, now.total)
+            if now.evaluated:
+                name, best = min(now.yardsticks.items(), key=lambda one: one[1])
+                err.print(
+                    f"step {now.steps:,} of {now.total:,}, {now.seconds:.0f} s: cost"
+                    f" {now.cost:.6g}, best {now.best_cost:.6g}, {name} {best:.6g}",
+                    soft_wrap=True,
+                )
 
-        yield on_progress
-
-
-def _print_evaluation(now: TrainingProgress) -> None:
-    if now.evaluated:
-        progress = f"step {now.steps:,} of {now.total:,}, {now.seconds:.0f} s"
-        err.print(f"{progress}: {_costs(now)}", soft_wrap=True)
-
-
-def _costs(now: TrainingProgress) -> str:
-    """Costs of a training so far, with that of the best yardstick."""
-    name = min(now.yardsticks, key=lambda one: now.yardsticks[one])
-    best = now.yardsticks[name]
-    return f"cost {now.cost:.6g}, best {now.best_cost:.6g}, {name} {best:.6g}"
+        yield None if bars is None else on_progress

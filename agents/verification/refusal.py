@@ -11,116 +11,30 @@ from agents.verification.result import Verification
 from agents.verification.tracks import Track
 from identification.design.experiment import advise
 from identification.judging.fit import Fit
-from shipgym.arrays import Flags, Floats
 from shipgym.errors import InputError
-from shipgym.models import ShipModel
 from shipgym.models.linear import steering_state_space
-from shipgym.trials.trial import Trial
-
-
-class Steering(NamedTuple):
-    """A model's steering about straight running: (v, r)' = A (v, r) + B delta."""
-
-    A: Floats
-    B: Floats
-
-    @property
-    def steady_side(self) -> float:
-        """A number with the sign of the yaw rate for a steady rudder to starboard."""
-        A, B = self.A, self.B
-        return float(A[1, 0] * B[0, 0] - A[0, 0] * B[1, 0])
 
 
 def why_refused(fit: Fit) -> str | None:
     """Reason against any design on a stable model, with the trial that would help.
 
-    Its steering at low frequency has another sign than in the trials. None if there is
-    no reason; what a model drawn does by itself is none, designs are judged in closed
-    loop.
+    At low frequency its rudder turns the ship to the other side than in the trials,
+    which are read only if a positive rudder turns to starboard in them. None if there
+    is no reason; what a model drawn does by itself is none, designs are judged in
+    closed loop.
     """
-    steering = _steering_of(fit.model)
-    if steering is None:  # no straight course: the designs say so
-        return None
-    why = _steers_to_other_side(fit, steering)
-    return None if why is None else f"{why}; run {helpful_trial(fit)}"
-
-
-def _steering_of(model: ShipModel) -> Steering | None:
-    """A model's steering; None if it has no straight course."""
     try:
-        A, B = steering_state_space(model)
-    except InputError:
+        A, B = steering_state_space(fit.model)
+    except InputError:  # no straight course: the designs say so
         return None
-    return Steering(A, B)
-
-
-def _steers_to_other_side(fit: Fit, steering: Steering) -> str | None:
-    """The side to which the rudder turns is known from three standard errors on."""
-    fitted = [trial for trial in fit.trials if trial.use == "fit"]
-    measured = rudder_effect(fitted, fit.model)
-    if abs(measured) <= 3.0 or measured * steering.steady_side >= 0.0:
+    # (v, r)' = A (v, r) + B delta: the sign of the yaw rate for a steady rudder
+    side = A[1, 0] * B[0, 0] - A[0, 0] * B[1, 0]
+    if side >= 0.0:
         return None
     return (
         "at low frequency the model's rudder turns the ship to the other side than in"
-        " the trials"
+        f" the trials; run {helpful_trial(fit)}"
     )
-
-
-def rudder_effect(trials: Sequence[Trial], model: ShipModel) -> float:
-    """Student's t of the rudder in yaw; 0 for too few samples.
-
-    Regression of the change of yaw rate over half a ship length on mean yaw rate, mean
-    rudder and a constant.
-    """
-    window = 0.5 * model.travel_time
-    parts = [_changes(trial, window) for trial in trials]
-    X = np.concatenate([part.features for part in parts])
-    y = np.concatenate([part.changes for part in parts])
-    rudder = 1  # column of `_Changes.features`
-    return _t_statistic(X, y, rudder)
-
-
-def _t_statistic(X: Floats, y: Floats, column: int) -> float:
-    """Student's t of the coefficient of a column; 0 for too few samples."""
-    freedom = len(y) - X.shape[1]
-    if freedom <= 0:
-        return 0.0
-
-    coefficients, *_ = np.linalg.lstsq(X, y, rcond=None)
-    residuals = y - X @ coefficients
-    variance = float(residuals @ residuals) / freedom
-    covariance = variance * np.linalg.pinv(X.T @ X)
-    error = float(np.sqrt(covariance[column, column]))
-    if error == 0.0:
-        return 0.0
-    return float(coefficients[column]) / error
-
-
-class _Changes(NamedTuple):
-    """Changes of the yaw rate over windows of a trial, and the means over each."""
-
-    features: Floats  # yaw rate, rudder and 1, shape (n_windows, 3)
-    changes: Floats  # shape (n_windows,)
-
-
-def _changes(trial: Trial, window: float) -> _Changes:
-    """Changes and means over windows of a length, s, that have samples."""
-    t = trial.t
-    edges = np.arange(t[0], t[-1], window)
-    first = np.searchsorted(t, edges)
-    counts = np.diff(first)[:-1]
-
-    filled = counts > 0  # none in a gap of the log
-
-    def means(channel: str) -> Floats:
-        sums = np.add.reduceat(trial[channel], first[:-1])[:-1]
-        return np.asarray(sums[filled] / counts[filled])
-
-    constant = np.ones(np.count_nonzero(filled))
-    features = np.column_stack([means("r"), means("delta"), constant])
-    rates = np.interp(edges, t, trial["r"])
-    changes = np.diff(rates)[: len(counts)]
-    return _Changes(features, changes[filled])
 
 
 def helpful_trial(fit: Fit) -> str:
@@ -210,20 +124,15 @@ def lost_control(
     n_counted = int(np.sum(counted))
     why = f"it loses control of {len(lost)} of {n_counted} models drawn"
     if len(lost):
+        unstable = int(np.sum(found.course_unstable[lost]))
         median_s = float(np.median(episodes.duration_s[lost]))
         why += (
             f" in course keeping (numbers {_shortened(lost.tolist())}, after"
-            f" {median_s:.0f} s in the median"
-            f"{_off_course(found.course_unstable[lost])})"
+            f" {median_s:.0f} s in the median, {unstable} of them unstable on course)"
         )
     if found.left_out:
         why += f"; {found.left_out} more run away whatever steers them"
     return why
-
-
-def _off_course(unstable: Flags) -> str:
-    """How many of some models keep no straight course by themselves."""
-    return f", {int(unstable.sum())} of them unstable on course"
 
 
 def _shortened(numbers: list[int]) -> str:

@@ -387,7 +387,7 @@ def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
             tmp_path / "no.onnx",
         ),
         (
-            "its folder does not exist",
+            "choose a folder that exists",
             "mariner",
             "--c",
             tmp_path / "no",

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 import agents
 import identification
 from agents import PID
-from agents.cli import CommandGroup, app, shared_options
+from agents.cli import app, shared_options
 from agents.jobs import JobError
 from shipgym import (
     InputError,
@@ -112,7 +112,7 @@ def test_wrong_usage_exits_with_2_and_says_why(command):
     ("words", "near"),
     [
         (["identfy"], "Did you mean 'identify'?"),
-        (["steer", "lq.json"], "No such command 'steer'. Commands: new-ship,"),
+        (["steer", "lq.json"], "No such command 'steer'"),
         (["export", "x", "--fmi", "2.0"], "No such option: --fmi"),
         (["export", "x", "--fmi", "2.0"], "--fmu"),
     ],
@@ -280,7 +280,7 @@ def test_an_unknown_name_is_refused_with_the_nearest_and_that_of_papers():
 
 def failing_command(error):
     """A command line whose one command raises an error."""
-    app = typer.Typer(cls=CommandGroup)
+    app = typer.Typer()
 
     @app.callback()
     def group():
@@ -311,21 +311,6 @@ def test_an_expected_error_is_one_message_and_an_exit_code(error, code, message)
 
 def test_an_unexpected_error_keeps_its_traceback():
     assert isinstance(failing_command(ZeroDivisionError()).exception, ZeroDivisionError)
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["", "--json"], "argument: expected a non-empty string, got ''"),
-        (["identify", ""], "argument: expected a non-empty string, got ''"),
-        (["identify", "x", "--out", ""], "--out: expected a non-empty string, got ''"),
-        (["identify", "--out="], "--out: expected a non-empty string, got ''"),
-    ],
-)
-def test_an_empty_argument_is_refused_by_the_name_of_its_option(words, message):
-    answer = shipgym(*words)
-    assert answer.exit_code == 2
-    assert message in " ".join(answer.stderr.split())
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from agents.job_results import result_to_json
-from agents.jobs import EngineError, JobEngine, JobError, run_jobs
+from agents.jobs import JobEngine, JobError, run_jobs
 from shipgym.errors import InputError
 
 JOBS = """
@@ -187,5 +187,5 @@ def test_wrong_engines_are_refused():
 
 def test_without_ray_its_engine_says_how_to_install_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(EngineError, match=r"pip install 'shipgym\[ray\]'"):
+    with pytest.raises(InputError, match=r"pip install 'shipgym\[ray\]'"):
         run_jobs(os.path.join, [{}], JobEngine("ray"))

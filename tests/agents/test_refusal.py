@@ -16,7 +16,6 @@ from agents.verification.closed_loop import (
 from agents.verification.refusal import (
     lost_control,
     refused_designs,
-    rudder_effect,
     simpler_structures,
     why_refused,
 )
@@ -30,7 +29,6 @@ def fit(chain):
 
 def test_nothing_is_refused_that_steers_as_in_the_trials(fit):
     assert why_refused(fit) is None
-    assert rudder_effect([t for t in fit.trials if t.use == "fit"], fit.model) > 10.0
 
 
 def test_steering_to_the_other_side_than_in_the_trials_is_refused(fit):

@@ -21,7 +21,7 @@ def test_bars_are_shown_on_a_terminal_that_is_not_to_be_quiet(quiet, monkeypatch
     printed = StringIO()
     console = Console(file=printed, force_terminal=True, width=110)
     monkeypatch.setattr(terminal, "err", console)
-    now = SimpleNamespace(steps=5000, evaluated=False, **NOW)
+    now = SimpleNamespace(steps=5000, evaluated=True, **NOW)
     with terminal.printing(as_json=False, quiet=quiet):
         with terminal.identifying("identifying"):
             list(progress.counted("[models] drawn", "abcd"))
@@ -37,7 +37,8 @@ def test_bars_are_shown_on_a_terminal_that_is_not_to_be_quiet(quiet, monkeypatch
         assert "%" not in last["identifying"]
         assert "100%" in last["[models]"]
         assert "25%" in last["training"]
-        assert last["training"].rstrip().endswith("cost 5, best 4.5, LQ 4.25")
+        costs = "step 5,000 of 20,000, 12 s: cost 5, best 4.5, LQ 4.25"
+        assert last["step"].rstrip() == costs
 
 
 def test_off_a_terminal_a_line_a_minute_is_printed(monkeypatch, capsys):
