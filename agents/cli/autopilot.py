@@ -50,14 +50,6 @@ def autopilot_command(
             ),
         ),
     ] = None,
-    tune: Annotated[
-        float,
-        Option(
-            min=0.0,
-            metavar="SECONDS",
-            help="Tune each design for this many seconds of processor time.",
-        ),
-    ] = 0.0,
 ) -> None:
     """Go from trials to a report on autopilots.
 
@@ -84,7 +76,6 @@ def autopilot_command(
             options=options,
             agents=agents or (),
             designs=designs,
-            tune_seconds=tune,
             progress=on_progress,
         )
     print_autopilot(result, out / "report.html", draws)
@@ -111,8 +102,6 @@ def print_autopilot(result: AutopilotResult, report: Path, draws: int) -> None:
     for warning in model_warnings(result.identification):
         warn(warning)
     if result.verification is not None:
-        for name, how in result.verification.tuned.items():
-            say(f"settings of {name.upper()} were tuned: {how}")
         for name, reason in result.verification.refused.items():
             warn(f"no {name.upper()} autopilot: {reason}")
     say(f"report: {report}")

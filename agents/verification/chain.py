@@ -30,7 +30,6 @@ from identification.models.refinement import whole_trials
 from identification.progress import PROGRESS, Progress
 from shipgym.checks import check_number, placed, quoted
 from shipgym.errors import InputError, UnstableModelError
-from shipgym.extras import library
 from shipgym.files import write_json
 from shipgym.manoeuvres.criteria import with_measured
 from shipgym.manoeuvres.measured import measured_by
@@ -55,7 +54,6 @@ def build_autopilot(
     options: Mapping[str, Any] | None = None,
     agents: Sequence[str | Path] = (),
     designs: Sequence[str] = DESIGNS,
-    tune_seconds: float = 0.0,
     progress: Progress | None = None,
 ) -> AutopilotResult:
     """Identify a ship from trials, design and verify autopilots, write the report.
@@ -69,14 +67,14 @@ def build_autopilot(
     of the episodes; `options`: of `identify`, by name, trials by file; those not given
     are the ship file's; `agents`: files of autopilots to verify beside those designed,
     or names of pretrained ones (`load_agent`); `designs`: kinds of controller to
-    design, of which those that lead another one keep to a track; `tune_seconds`: of
-    processor for a search of each design's settings, 0 for none; `progress`: called as
+    design, of which those that lead another one keep to a track; `progress`: called as
     the work goes on. Raises InputError for anything wrong with the files or
     arguments; nothing is written then.
     """
     check_number(draws, "draws", at_least=2)
     check_number(seed, "seed", at_least=0, at_most=2**32)
-    check_designs(designs, tune_seconds)
+    for kind in designs:
+        controller_class(kind, "autopilots")
     graph_objects()  # a missing extra is reported now, not after the work
     tell = progress or (lambda *_: None)
     files = (*FILES, *(f"{kind}.json" for kind in controller_kinds()))
@@ -93,7 +91,6 @@ def build_autopilot(
             tell=tell,
             guests=[guest for _, guest in guests],
             designs=designs,
-            tune_seconds=tune_seconds,
         )
 
         def fitted(stage_name: str, **changed: Any) -> AutopilotResult:
@@ -123,15 +120,6 @@ def report_fault(
     except Exception as error:
         return error
     return None
-
-
-def check_designs(designs: Sequence[str], tune_seconds: float) -> None:
-    """Refuse kinds that no controller has, and a search that cannot be done."""
-    for kind in designs:
-        controller_class(kind, "autopilots")
-    check_number(tune_seconds, "tune", at_least=0.0)
-    if tune_seconds > 0.0:
-        library("cma", "tune", "searching settings needs it")
 
 
 @contextmanager

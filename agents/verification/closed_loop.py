@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,21 +28,6 @@ if TYPE_CHECKING:
 
 #: Share of the models drawn that an autopilot may lose control of.
 MOST_LOST = 0.05
-
-
-class Held(NamedTuple):
-    """A design as it is given, and what came of it."""
-
-    controller: Any
-    outcome: Any  # its episodes, or its track
-
-    @property
-    def judged(self) -> tuple[int, float]:
-        """Models that it loses, and the mean cost, of a track the mean error, m."""
-        outcome = self.outcome
-        if isinstance(outcome, Track):
-            return int(np.sum(~outcome.arrived)), float(np.mean(outcome.rms))
-        return int(np.sum(outcome.terminated)), float(np.mean(outcome.cost))
 
 
 @dataclass(frozen=True, eq=False)

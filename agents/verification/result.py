@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -72,8 +72,6 @@ class Verification:
     #: draws that count against a design: the others run away whatever steers them,
     #: shape (n_draws,); None for all
     counted: Flags | None = None
-    #: what a search of settings found, by their kind
-    tuned: dict[str, str] = field(default_factory=dict)
 
     @property
     def left_out(self) -> int:
@@ -179,7 +177,6 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
         "controllers": {pilot.key: pilot_metrics(pilot) for pilot in found.pilots},
         "ranking": [pilot.key for pilot in found.pilots],
         "refused": found.refused,
-        "tuned": found.tuned,
         "tracks": {track.key: track_metrics(track) for track in found.tracks},
     }
 

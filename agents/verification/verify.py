@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -12,12 +12,10 @@ import numpy as np
 
 from agents.controllers.controller import Controller
 from agents.controllers.registry import controller_class
-from agents.rollouts.course_keeping import step_response
-from agents.training.controller_space import searched_kinds
-from agents.verification.closed_loop import ClosedLoop, Held, lost_tracks
+from agents.rollouts.course_keeping import Episodes, step_response
+from agents.verification.closed_loop import ClosedLoop, lost_tracks
 from agents.verification.result import STEP_DEG, Pilot, Verification
 from agents.verification.tracks import track_task
-from agents.verification.tuned import Tuned, no_worse, tuned_design
 from identification.progress import Progress
 from shipgym.arrays import Flags
 from shipgym.checks import quoted
@@ -42,19 +40,17 @@ def verify(
     guests: Sequence[Agent] = (),
     designs: Sequence[str] = DESIGNS,
     trials: Sequence[Trial] = (),
-    tune_seconds: float = 0.0,
 ) -> Verification:
     """Design autopilots on a model and run them over models drawn from its covariance.
 
     `model`: with a covariance;
     `draws`, `seed`, `designs`: see `build_autopilot`; `tell`: called with the
     progress; `guests`: further autopilots; `trials`: that the ship was put through: a
-    model drawn that runs away in one of them does not count; `tune_seconds`: of
-    processor for the settings of each design, 0 for none. Raises InputError if no
+    model drawn that runs away in one of them does not count. Raises InputError if no
     autopilot can be designed on it.
     """
     tell("models drawn", 0, draws)
-    designed = design_autopilots(model, designs, tune_seconds, tell)
+    designed = design_autopilots(model, designs)
     loop = ClosedLoop(
         model=model,
         draws=model.sample(draws, seed),
@@ -68,16 +64,15 @@ def verify(
     unstable = np.any([one.ran_away for one in drawn.values()], axis=0)
     stable = [loop.draws[number] for number in np.flatnonzero(~unstable).tolist()]
 
-    told: dict[str, str] = {}
-    courses = [
-        chosen(one, loop.sail, designed.tuned, told) for one in designed.controllers
-    ]
-    guides = [chosen(one, loop.led, designed.tuned, told) for one in designed.guides]
-    for held in courses:
-        loop.look_at(held.outcome.terminated)
-    for held in guides:
-        loop.look_at(lost_tracks(held.outcome))
-    steered = [*courses, *[Held(guest, loop.sail(guest)) for guest in guests]]
+    steered: list[tuple[Agent, Episodes]] = []
+    for pilot in designed.controllers:
+        episodes = loop.sail(pilot)
+        loop.look_at(episodes.terminated)
+        steered.append((pilot, episodes))
+    tracks = [loop.led(guide) for guide in designed.guides]
+    for track in tracks:
+        loop.look_at(lost_tracks(track))
+    steered += [(guest, loop.sail(guest)) for guest in guests]
     pilots = run_pilots(steered, [model, *stable], tell)
     return Verification(
         draws=draws,
@@ -88,9 +83,8 @@ def verify(
         nomoto=nomoto(model),
         pilots=tuple(sorted(pilots, key=partial(_rank, counted=loop.counted))),
         refused=designed.refused,
-        tracks=tuple(loop.of_counted(held.outcome) for held in guides),
+        tracks=tuple(loop.of_counted(track) for track in tracks),
         counted=loop.counted,
-        tuned=told,
     )
 
 
@@ -102,28 +96,8 @@ def keeps_course(model: ShipModel) -> bool:
         return False
 
 
-def chosen(
-    controller: Controller,
-    outcome_of: Callable[[Controller], Any],
-    tuned: Mapping[str, Tuned],
-    told: dict[str, str],
-) -> Held:
-    """A design with its outcome on the models drawn, or what a search found.
-
-    `outcome_of`: episodes or track of a controller; `tuned`: what searches found, by
-    kind; `told`: receives a sentence on each search.
-    """
-    designed = Held(controller, outcome_of(controller))
-    search = tuned.get(controller.kind)
-    if search is None:
-        return designed
-    other = Held(search.controller, outcome_of(search.controller))
-    held, told[controller.kind] = no_worse(designed, other, search)
-    return held
-
-
 def run_pilots(
-    steered: Sequence[Held],
+    steered: Sequence[tuple[Agent, Episodes]],
     ships: Sequence[ShipModel],
     tell: Progress,
 ) -> list[Pilot]:
@@ -157,28 +131,16 @@ class Designed:
     guides: list[Controller] = field(default_factory=list)  # keep a track
     #: why others could not be designed, by their kind
     refused: dict[str, str] = field(default_factory=dict)
-    #: what a search of settings found, by their kind
-    tuned: dict[str, Tuned] = field(default_factory=dict)
 
 
-def design_autopilots(
-    model: ShipModel,
-    designs: Sequence[str],
-    tune_seconds: float = 0.0,
-    tell: Progress = lambda *_: None,
-) -> Designed:
-    """Autopilots of some kinds; InputError if none of them keeps a heading.
-
-    `tune_seconds`: of processor for the settings of each, 0 for none.
-    """
+def design_autopilots(model: ShipModel, designs: Sequence[str]) -> Designed:
+    """Autopilots of some kinds; InputError if none of them keeps a heading."""
     found = Designed()
     for kind in dict.fromkeys(designs):
         made: Any = controller_class(kind)
         try:
             task = {"task": track_task(model)} if made.has_autopilot else {}
             controller = made.from_model(model, **task)
-            if tune_seconds > 0.0 and kind in searched_kinds():
-                found.tuned[kind] = tuned_design(kind, model, tune_seconds, tell)
             group = found.guides if made.has_autopilot else found.controllers
             group.append(controller)
         except InputError as error:  # this design does not suit the ship; another may

@@ -59,11 +59,6 @@ LINES = (
         " lq,ilos --out report",
         0,
     ),
-    (
-        f"autopilot ship.toml {LINEAR} --draws 2 --tune 0.2 --autopilots"
-        " lq,preview-lq --out tuned-report",
-        0,
-    ),
     (f"autopilot ship.toml {WRONG} --out report2", 2),
     ("export report/lq.json --c c --fmu lq.fmu --name lq", 0),
     ("export path-following-ppo --onnx policy.onnx", 0),

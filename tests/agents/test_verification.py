@@ -8,11 +8,9 @@ import pytest
 
 from agents import WheelOver
 from agents.verification.chain import build_autopilot
-from agents.verification.closed_loop import Held
 from agents.verification.refusal import lost_track
 from agents.verification.result import track_metrics
 from agents.verification.tracks import keep_track, track_task
-from agents.verification.tuned import no_worse
 from shipgym import InputError, load_model
 
 
@@ -50,27 +48,6 @@ def test_the_first_ship_of_a_track_is_the_identified_one_and_the_others_are_draw
         False,
         0,
     )
-
-
-@pytest.mark.parametrize(
-    ("cost", "lost", "taken"),
-    [(25.0, 0, True), (26.4, 0, True), (30.2, 1, False), (25.0, 1, False)],
-)
-def test_what_a_search_found_is_taken_if_it_is_no_worse_over_the_draws(
-    cost, lost, taken
-):
-    def held(name, mean, n_lost):
-        terminated = np.arange(200) < n_lost
-        return Held(
-            name, SimpleNamespace(cost=np.full(200, mean), terminated=terminated)
-        )
-
-    found = SimpleNamespace(evaluations=40, seconds=9.0)
-    search = SimpleNamespace(leads=False, found=found)
-    given, words = no_worse(held("lq", 26.4, 0), held("tuned", cost, lost), search)
-    assert given.controller == ("tuned" if taken else "lq")
-    assert ("the design is kept" in words) != taken
-    assert f"mean {cost:.3g} and {lost} lost, as designed 26.4 and 0 lost" in words
 
 
 def test_a_path_autopilot_that_does_not_arrive_on_the_identified_model_is_refused():
