@@ -97,8 +97,6 @@ def print_autopilot(result: AutopilotResult, report: Path, draws: int) -> None:
     if result.refusal is not None:
         fail(f"no autopilot is given: {result.refusal}; see {report}", FAILED)
 
-    if result.remark is not None:
-        warn(result.remark)
     for warning in model_warnings(result.identification):
         warn(warning)
     if result.verification is not None:

@@ -109,11 +109,11 @@ def benchmark_command(
 
 def _print_result(result: BenchmarkResult, out: Path) -> None:
     """Print the ranking, or all of the summary."""
-    from agents.cli.benchmark_tables import costs_table, ranking_tables
+    from agents.cli.benchmark_tables import ranking_tables
     from agents.cli.terminal import answer, console, say, warn
 
     answer(result.summary)
-    for table in (*ranking_tables(result), costs_table(result)):
+    for table in ranking_tables(result):
         console.print(table)
         console.print()
     say(f"written: {out}")

@@ -46,33 +46,6 @@ def ranking_tables(result: BenchmarkResult) -> Iterator[Table]:
         yield table
 
 
-def costs_table(result: BenchmarkResult) -> Table:
-    """Return a table of mean costs, below each task a row for each controller."""
-    table = plain_table(
-        "Mean cost of an episode on the ship, 95 % interval; the lowest first",
-        "task",
-        ">cost",
-        ">95 %",
-        ">score",
-        ">95 %",
-        ">lost",
-    )
-    for task in result.tasks:
-        table.add_row(Text(task, "bold"))
-        cells = result.cells(task)
-        for name in sorted(cells, key=lambda name: cells[name]["cost"]["value"]):
-            cell = cells[name]
-            table.add_row(
-                f"  {name}",
-                *_interval(cell["cost"], 2),
-                *_interval(cell["score"], 3),
-                str(cell["lost"] + cell["failed"]),
-            )
-        for name in result.summary["controllers"].keys() - cells.keys():
-            table.add_row(f"  {name}", "lost")
-    return table
-
-
 def _interval(of: Mapping[str, Any] | None, decimals: int) -> tuple[str, str]:
     """Return a value and its interval."""
     if of is None:

@@ -24,9 +24,7 @@ from agents.verification.result import AutopilotResult, Pilot, Verification
 from agents.verification.tracks import Track
 from agents.verification.verify import DESIGNS, verify
 from identification import IdentificationResult, identify
-from identification.judging.selection import RESPONSES
 from identification.judging.warnings import why_unstable
-from identification.models.refinement import whole_trials
 from identification.progress import PROGRESS, Progress
 from shipgym.checks import check_number, placed, quoted
 from shipgym.errors import InputError, UnstableModelError
@@ -84,42 +82,27 @@ def build_autopilot(
             guests = [(str(agent), load_agent(agent)) for agent in agents]
             settings = identification_settings(ship, options or {})
             trials, arguments = trials_of(ship, settings)
-        verified = partial(
-            verify,
-            draws=int(draws),
-            seed=int(seed),
-            tell=tell,
-            guests=[guest for _, guest in guests],
-            designs=designs,
+        with stage(tell, "identifying"), placed(str(ship.path)):
+            fit = identify(trials, **arguments)
+        result = examined(
+            ship,
+            fit,
+            guests,
+            partial(
+                verify,
+                fit.model,
+                int(draws),
+                int(seed),
+                tell,
+                [guest for _, guest in guests],
+                designs,
+                fit.trials,
+            ),
         )
-
-        def fitted(stage_name: str, **changed: Any) -> AutopilotResult:
-            with stage(tell, stage_name), placed(str(ship.path)):
-                fit = identify(trials, **(arguments | changed))
-            verify_fit = partial(verified, fit.model, trials=fit.trials)
-            return examined(ship, fit, guests, verify_fit)
-
-        result = or_simpler(fitted)
-        write_agents(result, draft)
-        failure = report_fault(result, draft, tell)
-    if failure is not None:
-        failure.add_note(f"the model and its autopilots are kept in {out}")
-        raise failure
-    return result
-
-
-def report_fault(
-    result: AutopilotResult, folder: Path, tell: Progress
-) -> Exception | None:
-    """Write figures and report; a fault of ours, which costs nobody the autopilots."""
-    try:
         with stage(tell, "writing the report"):
-            write_findings(result, folder)
-    except OSError:
-        raise
-    except Exception as error:
-        return error
-    return None
+            write_agents(result, draft)
+            write_findings(result, draft)
+    return result
 
 
 @contextmanager
@@ -168,36 +151,12 @@ def examined(
     found = _measured(found, fit)
     refusals = refused_designs(found, fit)
     refused = {**found.refused, **refusals.by_design}
-    return result(None, replace(found, refused=refused), refusals.of_all)
-
-
-def or_simpler(fitted: Callable[..., AutopilotResult]) -> AutopilotResult:
-    """The result, or where no autopilot is given on it, that of a simpler structure.
-
-    Of the next best of an automatic choice the first that is given one; `fitted`
-    identifies under the name of a stage with arguments that are changed.
-    """
-    result = fitted("identifying")
-    fit = result.identification
+    of_all = refusals.of_all
     ranking = fit.metrics.get("selection", {}).get("ranking", ())
-    if result.refusal is None or not ranking:
-        return result
-    chosen = fit.model.structure
-    refused = []
-    for structure in simpler_structures(ranking, chosen):
-        method = {"method": whole_trials()} if structure in RESPONSES else {}
-        simpler = fitted(f"identifying by {structure}", structure=structure, **method)
-        if simpler.stable and simpler.refusal is None:
-            reason = (
-                f"{chosen} predicts best, but no autopilot is given on it"
-                f" ({result.refusal}): the model and the autopilots are {structure}'s"
-            )
-            return replace(simpler, remark=reason)
-        refused.append(structure)
-    if not refused:
-        return result
-    tried = " and ".join(refused)
-    return replace(result, refusal=f"{result.refusal}; nor is one given on {tried}")
+    simpler = simpler_structures(ranking, fit.model.structure)
+    if of_all is not None and simpler:
+        of_all += f"; or choose a simpler structure, {quoted(simpler)}"
+    return result(None, replace(found, refused=refused), of_all)
 
 
 def _measured(found: Verification, fit: IdentificationResult) -> Verification:

@@ -90,8 +90,6 @@ def verdict_of(result: AutopilotResult) -> tuple[str, str]:
         sentences.append(headline(found))
         if is_certain(found):
             kind = "good"
-    if result.remark:
-        sentences.insert(0, f"{result.remark}.")
     if result.refusal:
         sentences.insert(0, f"No autopilot is given: {result.refusal}.")
         kind = "bad"

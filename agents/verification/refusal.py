@@ -109,10 +109,7 @@ def refused_designs(
 def lost_control(
     found: Verification, episodes: Episodes, most_lost: float = MOST_LOST
 ) -> str | None:
-    """Reason to refuse a design that loses too many models drawn, or None.
-
-    It says how many, which, when, and what is special about them.
-    """
+    """Reason to refuse a design that loses too many models drawn, or None."""
     terminated = episodes.terminated
     counted = found.counted
     if counted is None:
@@ -124,22 +121,11 @@ def lost_control(
     n_counted = int(np.sum(counted))
     why = f"it loses control of {len(lost)} of {n_counted} models drawn"
     if len(lost):
-        unstable = int(np.sum(found.course_unstable[lost]))
         median_s = float(np.median(episodes.duration_s[lost]))
-        why += (
-            f" in course keeping (numbers {_shortened(lost.tolist())}, after"
-            f" {median_s:.0f} s in the median, {unstable} of them unstable on course)"
-        )
+        why += f" in course keeping, after {median_s:.0f} s in the median"
     if found.left_out:
         why += f"; {found.left_out} more run away whatever steers them"
     return why
-
-
-def _shortened(numbers: list[int]) -> str:
-    """The first few of some numbers."""
-    most = 8
-    words = ", ".join([str(number) for number in numbers[:most]])
-    return f"{words}, ..." if len(numbers) > most else words
 
 
 def lost_track(track: Track, most_lost: float = MOST_LOST) -> str | None:

@@ -110,8 +110,6 @@ class AutopilotResult:
     verification: Verification | None  # none where the model is unstable or refused
     # why no autopilot is given although the model is stable, and what would help
     refusal: str | None = None
-    # why the model is that of another structure than the one that predicts best
-    remark: str | None = None
 
     @property
     def model(self) -> ShipModel:
@@ -152,7 +150,6 @@ class AutopilotResult:
             "stable": self.stable,
             "instability": self.instability,
             "refusal": self.refusal,
-            "remark": self.remark,
             "diagnostics": diagnostics,
         }
         if self.verification is not None:

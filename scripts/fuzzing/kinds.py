@@ -16,7 +16,7 @@ import numpy as np
 from rich.console import Console
 
 from agents import load_agent, load_results
-from agents.cli.benchmark_tables import costs_table, ranking_tables
+from agents.cli.benchmark_tables import ranking_tables
 from agents.suites.suite import parse_suite
 from agents.training.settings import load_settings, read_settings_file
 from fuzzing.reading import Kind
@@ -63,7 +63,7 @@ def use_results(result: Any) -> None:
     """The tables that are printed, and every figure."""
     if result is None:  # to be computed again
         return
-    for table in (*ranking_tables(result), costs_table(result)):
+    for table in ranking_tables(result):
         SHOWN.print(table)
     result.to_frame()
     written(result.summary)

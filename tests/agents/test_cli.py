@@ -322,7 +322,6 @@ def built(monkeypatch):
         stable=True,
         instability=None,
         refusal=None,
-        remark=None,
         identification=None,
         calls=[],
     )

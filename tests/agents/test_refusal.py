@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from agents import PID
-from agents.verification.chain import or_simpler, write_agents, write_findings
+from agents.verification.chain import write_agents, write_findings
 from agents.verification.closed_loop import (
     gathers_speed,
     is_possible,
@@ -100,8 +100,7 @@ def test_a_refusal_says_how_often_which_models_were_lost_and_when(chain):
     )
     said = lost_control(replace(found, course_unstable=lost), episodes)
     assert said.startswith(
-        f"it loses control of 3 of {n} models drawn in course keeping (numbers 0, 1, 2,"
-        " after 40 s in the median, 3 of them unstable on course)"
+        f"it loses control of 3 of {n} models drawn in course keeping, after 40 s"
     )
     others = replace(found, counted=~lost, course_unstable=lost)
     assert lost_control(others, episodes) is None
@@ -140,26 +139,6 @@ def test_designs_that_lose_control_are_not_written(chain, tmp_path):
     metrics = json.loads((tmp_path / "metrics.json").read_text())
     assert metrics["refusal"] == refusals.of_all
     assert "No autopilot is given: " in (tmp_path / "report.html").read_text()
-
-
-def test_where_no_autopilot_is_given_the_next_best_structure_is_tried(chain):
-    result, fit = chain[1], chain[1].identification
-    own = fit.model.structure
-    ranking = {"ranking": [stood(own, 40), stood("norrbin", 3), stood("nomoto", 2)]}
-    chosen = replace(fit, metrics=fit.metrics | {"selection": ranking})
-    refused = replace(result, identification=chosen, refusal="it is lost")
-
-    by_structure = {"norrbin": refused, "nomoto": result}
-    given = or_simpler(
-        lambda _, structure="", **more: by_structure.get(structure, refused)
-    )
-    assert given.refusal is None
-    assert given.remark.startswith(f"{own} predicts best, but no autopilot is given")
-    assert "(it is lost): the model and the autopilots are nomoto's" in given.remark
-
-    of_none = or_simpler(lambda _, **changed: refused)
-    assert of_none.refusal == "it is lost; nor is one given on norrbin and nomoto"
-    assert or_simpler(lambda _, **changed: result) is result
 
 
 def test_a_model_that_is_refused_gives_a_report_that_says_why(chain, tmp_path):
