@@ -63,7 +63,7 @@ for _name in (
     FUNCTIONS[getattr(math, _name)] = FUNCTIONS[getattr(np, _name)] = _name
 
 #: Names that a variable must not have.
-TAKEN = KEYWORDS | {"whole_power", "interpolated", "within", *FUNCTIONS.values()}
+TAKEN = KEYWORDS | {"whole_power", "within", *FUNCTIONS.values()}
 
 
 def literal(value: float) -> str:

@@ -283,9 +283,6 @@ class FunctionWriter:
             return self._operation(OPERATORS[function], values, kinds)
         if function is np.where:
             return self._choice(*values)
-        if function is np.interp:
-            n_rows = values[1].kind.n
-            return self.node(f"interpolated(%s, {n_rows}, %s, %s)", values, float)
         if function is float:
             return self._choice(values[0], 1.0, 0.0) if kinds == {bool} else values[0]
         if function is int:

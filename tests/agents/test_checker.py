@@ -95,23 +95,6 @@ class Listed(Helmsman):
         return [seen[..., :1], state]
 
 
-class ByKeyword(Helmsman):
-    def predict(
-        self, observation, *, state=None, episode_start=None, deterministic=True
-    ):
-        return observation[..., :1], state
-
-
-class Unnamed(Helmsman):
-    def predict(self, observation, memory=None, starts=None, sure=True):
-        return observation[..., :1], memory
-
-
-class Short:
-    def predict(self, observation):
-        return observation[..., :1], None
-
-
 class Misnamed(Helmsman):
     observation_names = ("heading_error", *OBSERVATION_NAMES[1:])
 
@@ -149,12 +132,6 @@ def test_a_user_s_own_passes():
         (Curt(), "expected a pair: action and state, got ndarray"),
         (Triple(), "expected a pair: action and state, got tuple"),
         (Listed(), "expected a pair: action and state, got list"),
-        (
-            ByKeyword(),
-            r"expected predict\(observation, state=None.*too many positional arguments",
-        ),
-        (Unnamed(), "expected predict.* unexpected keyword argument 'state'"),
-        (Short(), "expected predict.* unexpected keyword argument 'state'"),
         (object(), "expected a method predict"),
         (
             Misnamed(),
