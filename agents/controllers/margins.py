@@ -102,7 +102,7 @@ class Compensator:
         `name` is that of the design. Raises InputError if the closed loop is unstable.
         """
         self._check_closed_loop(ship, name)
-        omega = np.geomspace(SLOWEST, 1.0, N_FREQUENCIES) * np.pi / ship.dt
+        omega = frequencies_of(ship)
         response = self.responses(ship, omega)
         breaks = {
             place: crossings(omega, broken) for place, broken in response.broken.items()

@@ -421,7 +421,7 @@ class DesignModels:
     def helm(self) -> HelmMemory:
         """Memory of LQ, which knows the rudder by its model of the gear."""
         zero = np.zeros_like(self.along)
-        return HelmMemory(zero, zero, zero, zero, zero, zero, started=zero)
+        return HelmMemory(*[zero] * len(HelmMemory._fields))
 
     def drift(self) -> Floats:
         """Angle from the velocity through the water to that over ground, rad."""
