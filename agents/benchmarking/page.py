@@ -76,8 +76,10 @@ def _limits_text(limits: Mapping[str, float]) -> str:
     parts = []
     for name, limit in limits.items():
         title = METRICS[name]
-        statistic = STATISTICS[LIMITED_FIGURES[name]]
-        parts.append(f"{title} {number(limit)} ({statistic})")
+        kind = LIMITED_FIGURES[name]
+        statistic = STATISTICS[kind]
+        largest = number(limit)
+        parts.append(f"{title} {largest} ({statistic})")
     if not parts:
         return ""
     limited = "; ".join(parts)

@@ -275,13 +275,19 @@ def _about_entry(
     files: dict[str, str] = {}
     for task in tasks:
         files |= entry.fingerprint(task)
-    own = {task.name: cells[entry.name, task.name] for task in tasks}
-    made = [cell for cell in own.values() if not cell.refused]
+    refused = {}
+    steps = []
+    for task in tasks:
+        cell = cells[entry.name, task.name]
+        if cell.refused:
+            refused[task.name] = cell.refused
+        else:
+            steps.append(cell.ship_steps)
     return {
         "source": entry.source if entry.is_text else None,
         "files": files,
-        "refused": {name: cell.refused for name, cell in own.items() if cell.refused},
-        "ship_steps": float(np.mean([cell.ship_steps for cell in made] or [0.0])),
+        "refused": refused,
+        "ship_steps": float(np.mean(steps or [0.0])),
     }
 
 

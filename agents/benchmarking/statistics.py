@@ -70,9 +70,8 @@ def interval(value: float, draws: Floats) -> Interval:
     return {"value": finite(value), "low": finite(low), "high": finite(high)}
 
 
-def mean_cost(costs: Mapping[str, Floats], draws: Draws) -> Interval:
+def mean_cost(values: Floats, task: str, draws: Draws) -> Interval:
     """Mean over runs and episodes of one task."""
-    ((task, values),) = costs.items()
     return interval(float(values.mean()), draws.means(values, task))
 
 

@@ -102,14 +102,18 @@ class Summary:
         self, task: BenchmarkTask, on: str, name: str, means: dict[str, Any]
     ) -> dict[str, Any]:
         cell = self.cells[name, task.name]
-        costs = {task.name: self.costs(name, on)[task.name]}
         figures = cell.figures[on]
+        costs = figures["cost"]
+        own = {task.name: costs}
+        rules = self.costs("", on)
+        lost = figures["terminated"].sum()
+        failed = figures["failed"].sum()
         return {
-            "cost": mean_cost(costs, self.draws),
-            "score": mean_score(costs, self.costs("", on), self.draws),
-            "runs": len(figures["cost"]),
-            "lost": int(figures["terminated"].sum()),
-            "failed": int(figures["failed"].sum()),
+            "cost": mean_cost(costs, task.name, self.draws),
+            "score": mean_score(own, rules, self.draws),
+            "runs": len(costs),
+            "lost": int(lost),
+            "failed": int(failed),
             "failure": cell.failures.get(on, ""),
             "exceeded": exceeded(task.limits, means),
             "metrics": means,

@@ -60,17 +60,13 @@ def metrics(run: Rollout) -> dict[str, Floats]:
     success = succeeded(run)
     failed = success == 0.0
     lost = run.terminated & failed
-    heel = nowhere  # of a ship without roll
-    if "phi" in run.histories:
-        angles = np.abs(during(run, "phi"))
-        heel = np.degrees(angles.max(axis=0, initial=0.0))
     return {
         **costs(run),
         **steering(run),
         **followed,
         **violations(run),
         "success": success,
-        "heel_deg": heel,
+        "heel_deg": largest_heel(run),
         "speed_lost_percent": speed_lost(run),
         "extrapolating": mean(run, "extrapolating"),
         "terminated": lost.astype(np.float64),
@@ -169,6 +165,15 @@ def reversals(angle: Floats, counts: Flags) -> Floats:
         lowest[turns] = now[turns]
         highest[turns] = now[turns]
     return number
+
+
+def largest_heel(run: Rollout) -> Floats:
+    """Largest angle of heel to either side, deg; NaN of a ship without roll."""
+    if "phi" not in run.histories:
+        return np.full(len(run.costs), np.nan)
+    angles = np.abs(during(run, "phi"))
+    largest: Floats = angles.max(axis=0, initial=0.0)
+    return np.asarray(np.degrees(largest))
 
 
 def speed_lost(run: Rollout) -> Floats:

@@ -156,8 +156,11 @@ def _interval(criterion: Criterion) -> str:
     if criterion.interval is None:
         return NONE
     low, high = criterion.interval
-    upper = "no upper bound" if high is None else fixed(high)
-    return f"{fixed(low)} to {upper}"
+    lower = fixed(low)
+    upper = "no upper bound"
+    if high is not None:
+        upper = fixed(high)
+    return f"{lower} to {upper}"
 
 
 def designs_of(found: Verification) -> dict[str, Any]:

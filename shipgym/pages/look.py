@@ -84,17 +84,14 @@ def _facts(trial: Trial) -> dict[str, str]:
     n_samples = len(trial)
     step = trial.duration / (n_samples - 1)
     velocity = "over ground" if trial.over_ground else "through the water"
-    facts = {
-        "samples": (
-            f"{n_samples} over {trial.duration:.5g} s, {step:.4g} s apart on average"
-        ),
-        "channels": ", ".join(trial.channels),
-        "computed from others": ", ".join(sorted(trial.derived)) or "none",
-        "u and v": velocity if "u" in trial else "not known",
-    }
     filled = []
     for name, count in trial.repaired.items():
         filled.append(f"{count} values of {name}")
-    if filled:
-        facts["filled in"] = ", ".join(filled)
-    return facts
+    derived = sorted(trial.derived)
+    return {
+        "samples": f"{n_samples} over {trial.duration:.5g} s, one in {step:.4g} s",
+        "channels": ", ".join(trial.channels),
+        "computed from others": ", ".join(derived) or "none",
+        "u and v": velocity if "u" in trial else "not known",
+        "filled in": ", ".join(filled) or "none",
+    }

@@ -4,7 +4,6 @@ import math
 
 NONE = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -20,10 +19,7 @@ def number(value: float | None, digits: int = 3) -> str:
         decimals = max(after_first - magnitude, 0)
         return fixed(value, decimals)
 
-    mantissa, exponent = f"{value:.{after_first}e}".split("e")
-    mantissa = mantissa.replace("-", MINUS)
-    power = str(int(exponent)).translate(_SUPERSCRIPTS)
-    return f"{mantissa} · 10{power}"
+    return f"{value:.{after_first}e}".replace("-", MINUS)
 
 
 def fixed(value: float | None, decimals: int = 2) -> str:

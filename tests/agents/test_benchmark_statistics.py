@@ -22,7 +22,7 @@ def test_intervals_of_every_statistic_are_those_of_theory():
     sigma = 10.0 / np.sqrt(1000)
     rule_costs = {"a": np.full((1, 1000), 50.0)}
     for found, error in (
-        (mean_cost({"a": costs}, draws), sigma),
+        (mean_cost(costs, "a", draws), sigma),
         (mean_score({"a": costs}, rule_costs, draws), sigma / 50.0),
     ):
         assert found["low"] < found["value"] < found["high"]
@@ -34,7 +34,7 @@ def test_training_runs_that_differ_widen_the_interval():
     alike = np.tile(RANDOM.normal(50.0, 1.0, 100), (5, 1))
     apart = alike + np.array([[-20.0], [-10.0], [0.0], [10.0], [20.0]])
     draws = Draws(100)
-    narrow, wide = mean_cost({"a": alike}, draws), mean_cost({"a": apart}, draws)
+    narrow, wide = mean_cost(alike, "a", draws), mean_cost(apart, "a", draws)
     assert narrow["value"] == pytest.approx(wide["value"])
     assert wide["high"] - wide["low"] > 10.0 * (narrow["high"] - narrow["low"])
 
