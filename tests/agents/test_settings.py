@@ -93,6 +93,7 @@ SHAFT = {"action": "rudder-shaft"}
     ("arguments", "message"),
     [
         ({"seed": 800}, "seed: expected an integer of at least 0 and at most 799"),
+        ({"options": {"rate_limit": 0.1}}, "--option rate_limit: expected a setting"),
         ({"options": SHAFT}, "action: .*'mariner'"),
         (
             {"options": SHAFT, "model": "kvlcc2", "settings": {"base": "lq"}},
