@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +36,11 @@ class IdentificationResult(Fit):
     def __repr__(self) -> str:
         """Return a card of a few lines: the verdict, errors and coefficients."""
         return result_card(self)
+
+    def _repr_html_(self) -> str:
+        """Return the card and a table of the coefficients, for a notebook."""
+        table: str = self.to_frame().to_html(float_format="%.4g")
+        return f"<pre>{escape(result_card(self))}</pre>{table}"
 
     def to_frame(self) -> DataFrame:
         """Return a row for each coefficient: value, standard error and t."""

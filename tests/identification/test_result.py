@@ -139,6 +139,7 @@ def test_a_notebook_shows_a_card_and_frames(truncated: IdentificationResult) -> 
     assert held_out_error(truncated) in card
     frame = truncated.to_frame()
     assert frame["value"].to_dict() == truncated.coefficients
+    assert "<td>" in truncated._repr_html_()
     uses = [trial.use for trial in truncated.trials]
     assert truncated.trials_frame()["use"].tolist() == uses
 
