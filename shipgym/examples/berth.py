@@ -3,12 +3,19 @@
 from math import sqrt
 from typing import Annotated, NamedTuple
 
-from shipgym.engine.mathematics import clip, sin_cos
-from shipgym.tasks.contract import ObservationSpec, Setting, Unit, drawn, under_way
+from shipgym.engine.mathematics import clip, pick, sin_cos
+from shipgym.tasks.contract import (
+    Flag,
+    ObservationSpec,
+    Setting,
+    Unit,
+    drawn,
+    under_way,
+)
 from shipgym.tasks.shapes import ChartWidth, Line, ShipOutline
 
 EPISODE_STEPS = 300
-REPORTED = ("distance", "speed")
+REPORTED = ("distance", "speed", "success")
 QUAY = 0.6  # ship lengths to starboard
 NEAR = 0.4  # ship lengths to the berth at the end
 SLOW = 0.06  # part of service speed at the end
@@ -23,6 +30,7 @@ class State(NamedTuple):
     heading_setpoint: float  # rad, along the quay
     distance: float  # m, to the berth
     speed: float  # m/s
+    success: Flag
 
 
 class Reward(NamedTuple):
@@ -58,7 +66,7 @@ def begin(ship, settings, random, plan):
     east = ship.length * drawn(random, 0, -0.7, 0.2)
     psi = drawn(random, 1, -0.1, 0.1)
     speed, shaft = settings.speed * ship.speed, settings.speed * ship.shaft
-    return under_way(-away, east, psi, speed, shaft), State(0.0, away, speed)
+    return under_way(-away, east, psi, speed, shaft), State(0.0, away, speed, 0.0)
 
 
 def step(motion, state, interval, ship, settings):
@@ -77,7 +85,8 @@ def step(motion, state, interval, ship, settings):
     failed = aground | (motion.x > ship.length)
     stopped = speed < SLOW * ship.speed
     arrived = stopped & (distance < NEAR * ship.length)
-    return State(0.0, distance, speed), reward, failed, arrived
+    after = State(0.0, distance, speed, pick(arrived, 1.0, 0.0))
+    return after, reward, failed, arrived
 
 
 def worst_cost(settings):

@@ -6,6 +6,7 @@ from typing import Annotated, NamedTuple
 
 from shipgym.engine.mathematics import arctan2, clip, pick, sin_cos, wrap
 from shipgym.tasks.contract import (
+    Flag,
     ObservationSpec,
     Setting,
     Unit,
@@ -15,7 +16,7 @@ from shipgym.tasks.contract import (
 from shipgym.tasks.shapes import ChartWidth, Line
 
 EPISODE_STEPS = 600
-REPORTED = ("off", "over")
+REPORTED = ("off", "over", "success")
 WAVE, SWING = 2.0 * pi / 8e3, 600.0  # of its bends, rad/m, and m to each side
 END, VILLAGE = 12000.0, 6000.0  # m north; the village is 2 km long
 
@@ -30,6 +31,7 @@ class State(NamedTuple):
     heading_setpoint: float  # rad, along the river
     off: float  # part of the half width, to starboard positive
     over: float  # m/s, over the limit
+    success: Flag
 
 
 class Reward(NamedTuple):
@@ -75,7 +77,7 @@ def begin(ship, settings, random, plan):
     aside = 0.4 * settings.half_width * drawn(random, 0, -1.0, 1.0)
     along = course(0.0)
     motion = at_service_speed(0.0, aside, along + drawn(random, 1, -0.1, 0.1), ship)
-    return motion, State(along, aside / settings.half_width, 0.0)
+    return motion, State(along, aside / settings.half_width, 0.0, 0.0)
 
 
 def step(motion, state, interval, ship, settings):
@@ -86,7 +88,9 @@ def step(motion, state, interval, ship, settings):
     over = max(speed - limit, 0.0)
     delay = clip(1.0 - speed / min(limit, ship.speed - settings.stream), 0.0, 1.0)
     reward = Reward(-delay, -off * off, -over * over)
-    return State(along, off, over), reward, fabs(off) > 1.0, motion.x > END
+    arrived = motion.x > END
+    after = State(along, off, over, pick(arrived, 1.0, 0.0))
+    return after, reward, fabs(off) > 1.0, arrived
 
 
 def worst_cost(settings):
