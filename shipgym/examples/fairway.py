@@ -15,7 +15,7 @@ from shipgym.tasks.contract import (
     sin_cos,
 )
 
-REPORTED = ("speeding", "cross_track")
+REPORTED = ("speeding", "cross_track", "success")
 
 
 class Settings(NamedTuple):
@@ -41,6 +41,7 @@ class State(NamedTuple):
     cross_track: float  # m, positive to starboard
     limit: float  # m/s, in force
     speeding: Flag
+    success: Flag
 
 
 class Reward(NamedTuple):
@@ -74,7 +75,7 @@ class Observation(NamedTuple):
 def begin(ship, settings, random, plan):
     aside = 0.5 * settings.half_width * ship.length * drawn(random, 0, -1.0, 1.0)
     motion = at_service_speed(0.0, aside, drawn(random, 1, -0.1, 0.1), ship)
-    return motion, State(0.0, aside, ship.speed, 0.0)
+    return motion, State(0.0, aside, ship.speed, 0.0, 0.0)
 
 
 def step(motion, state, interval, ship, settings):
@@ -85,8 +86,9 @@ def step(motion, state, interval, ship, settings):
     delay = 1.0 - clip(motion.u / limit, 0.0, 1.0)
     # minus the parts of the cost, from which the engine makes the bounded reward
     reward = Reward(-off * off, -delay, -settings.over_speed_weight * over * over)
-    after = State(0.0, motion.y, limit, pick(over > 0.01, 1.0, 0.0))
-    return after, reward, fabs(off) > 1.0, x > settings.zone_ends + 8.0
+    arrived = x > settings.zone_ends + 8.0
+    flags = pick(over > 0.01, 1.0, 0.0), pick(arrived, 1.0, 0.0)
+    return State(0.0, motion.y, limit, *flags), reward, fabs(off) > 1.0, arrived
 
 
 def worst_cost(settings):
