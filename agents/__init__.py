@@ -15,6 +15,6 @@ if (
 ):
     del sys.path[0]
 
-from lazy_loader import attach_stub
+from shipgym.extras import public_names
 
-__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = public_names(__name__, __file__)

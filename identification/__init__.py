@@ -4,6 +4,6 @@ The public names stand in `__init__.pyi` and are imported on first use: scikit-l
 takes a second.
 """
 
-from lazy_loader import attach_stub
+from shipgym.extras import public_names
 
-__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = public_names(__name__, __file__)

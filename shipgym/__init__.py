@@ -4,12 +4,11 @@ Importing shipgym registers its environments with Gymnasium. The public names ar
 `__init__.pyi`; each is imported when it is first used.
 """
 
-from lazy_loader import attach_stub
-
 from shipgym.envs.registration import register_environments
+from shipgym.extras import public_names
 
 __version__ = "0.1.0"
 
-__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = public_names(__name__, __file__)
 
 register_environments()

@@ -1,9 +1,44 @@
 """Libraries of the package's extras, imported on first use."""
 
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
+from lazy_loader import attach_stub
+
+from shipgym.checks import did_you_mean
 from shipgym.errors import InputError
+
+#: Classes by the names that papers have for them.
+IN_PAPERS = {
+    "TLSSVM": "TruncatedLSSVM",
+    "ABCLSSVR": "ArtificialBeeColony",
+    "PSOLSSVR": "ParticleSwarm",
+    "LSSVR": "LSSVM",
+}
+
+
+def public_names(
+    package: str, file: str
+) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """What a package's `__getattr__`, `__dir__` and `__all__` are, by its `.pyi` file.
+
+    Each name is imported when it is first used; an unknown one is refused with the
+    nearest.
+    """
+    get, names, listed = attach_stub(package, file)
+
+    def named(name: str) -> Any:
+        try:
+            return get(name)
+        except AttributeError:
+            meant = IN_PAPERS.get(name.upper().replace("_", ""), name)
+            near = did_you_mean(meant, listed)
+            message = f"module {package!r} has no attribute {name!r}.{near}"
+            # with a name, Python adds no nearest name of its own
+            raise AttributeError(message, name=name) from None
+
+    return named, names, listed
 
 
 def library(name: str, extra: str, use: str = "") -> Any:

@@ -7,8 +7,9 @@ from contextlib import contextmanager
 from inspect import CO_GENERATOR, CO_VARARGS, CO_VARKEYWORDS
 from pathlib import Path
 from sysconfig import get_path
+from time import monotonic
 from traceback import extract_tb
-from types import CodeType, FunctionType, ModuleType
+from types import CodeType, FrameType, FunctionType, ModuleType
 from typing import Any
 
 from shipgym.errors import InputError
@@ -122,6 +123,29 @@ def asked(function: Callable[..., Any], *arguments: Any) -> Any:
         raise InputError(
             f"{place_of(function, error)}: {type(error).__name__}: {error}"
         ) from error
+
+
+@contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Raise a TimeoutError in a user's function that is still running after a time."""
+    end = monotonic() + seconds
+
+    def look(frame: FrameType, event: str, argument: Any) -> Any:
+        if frame.f_code.co_filename.startswith(LIBRARIES):
+            return None
+        if monotonic() > end:
+            raise TimeoutError(
+                f"expected a function that returns, got none after {seconds:g} s; look"
+                " for a loop that does not end"
+            )
+        return look
+
+    before = sys.gettrace()
+    sys.settrace(look)
+    try:
+        yield
+    finally:
+        sys.settrace(before)
 
 
 def place_of(function: Any, error: BaseException | None = None) -> str:

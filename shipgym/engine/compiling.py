@@ -9,6 +9,7 @@ it is.
 
 import os
 import sys
+import warnings
 from typing import Any
 
 import numpy as np
@@ -119,22 +120,30 @@ class Compilation(Specialisation):
 def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
     """Compile a loop and what it calls."""
     numba = load_numba()
-    from numba.core.errors import NumbaError, UnsupportedBytecodeError
+    from numba.core.errors import NumbaError, NumbaWarning, UnsupportedBytecodeError
 
     # typical time of a loop on a laptop
     tell_who_waits(f"shipgym: compiling {what}, once, about 7 s")
     specialised = _named(Compilation(hooks).copy(loop))
+    before = numba.config.ALWAYS_WARN_UNINIT_VAR
+    # Python fails where an unset variable is used; compiled code takes a 0 for it
+    numba.config.ALWAYS_WARN_UNINIT_VAR = int(hooks.get("CHECKED", True))
     try:
-        return numba.njit(signature, nogil=True, **SEMANTICS)(specialised)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", ".*uninitialized variable", NumbaWarning)
+            return numba.njit(signature, nogil=True, **SEMANTICS)(specialised)
     # the latter three: another record than is due, none at all, one whose field is set
     except (
         NumbaError,
+        NumbaWarning,
         UnsupportedBytecodeError,
         TypeError,
         AttributeError,
         NotImplementedError,
     ) as error:
         raise InputError(explanation(error, what)) from None
+    finally:
+        numba.config.ALWAYS_WARN_UNINIT_VAR = before
 
 
 def _named(copy: Any) -> Any:

@@ -18,6 +18,10 @@ PLAINLY = {
     r".*: setitem\(readonly array.*": (
         "expected global arrays to be only read, got one that is written"
     ),
+    r"Detected uninitialized variable (\w+)": (
+        r"expected variables that are set in every case, got '\1', which is not; give"
+        " it a value before the if or the loop that sets it"
+    ),
 }
 
 

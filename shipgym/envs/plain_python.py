@@ -16,8 +16,10 @@ from shipgym.engine.motion import Motion
 from shipgym.engine.records import LANES, Record, is_array, is_record, members
 from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError
-from shipgym.python_files import asked, place_of
+from shipgym.python_files import asked, place_of, time_limit
 from shipgym.tasks.contract import Readings
+
+LONGEST_CALL = 5.0  # s, of a user's function
 
 
 def plain_loop(
@@ -89,7 +91,8 @@ def _checked(program: EpisodeProgram, name: str, form: Any) -> Callable[..., Any
 def _result_of(function: Any, reward: Any, form: Any, *arguments: Any) -> Any:
     """Call a function, and refuse a result in another form."""
     # NumPy's numbers fail as Python's own do
-    with np.errstate(divide="raise", invalid="raise"):
+    numbers = np.errstate(divide="raise", invalid="raise")
+    with numbers, time_limit(LONGEST_CALL):
         given = asked(function, *arguments)
     fault = _fault(given, form, "returned value")
     if fault and reward is not None:

@@ -86,6 +86,14 @@ def test_a_vector_environment_checks_a_new_task(tmp_path):
         gymnasium.make_vec(COURSE, num_envs=3, task=path, **SHIP)
 
 
+def test_a_loop_that_does_not_end_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("shipgym.envs.plain_python.LONGEST_CALL", 0.2)
+    path, line = fairway(tmp_path, "    while motion.x < 1e9:\n        pass")
+    message = rf"line ({line}|{line + 1}), in step: TimeoutError: .* does not end"
+    with pytest.raises(InputError, match=message):
+        gymnasium.make(COURSE, task=path, **SHIP)
+
+
 def test_attributes_of_functions_are_read_at_the_top(tmp_path):
     head = "def helm(x):\n    return x\n\n\nREPORTED"
     path, line = fairway(tmp_path, "    helm.start", ("REPORTED", head))
@@ -108,3 +116,11 @@ def test_attributes_of_functions_are_read_at_the_top(tmp_path):
 def test_slips_of_users_are_told_with_their_line(name, message):
     (problem,) = check_task(CASES / f"{name}.py", dt=10.0, **SHIP).problems
     assert re.search(message, problem)
+
+
+def test_a_variable_that_may_be_unset_is_refused_with_its_line(tmp_path):
+    lines = "    if motion.x < 300.0:\n        late = 1.0\n    motion.u * late"
+    path, line = fairway(tmp_path, lines)
+    message = rf"fairway.py, line {line + 2}\): expected variables that .* got 'late'"
+    with pytest.raises(InputError, match=message):
+        gymnasium.make(COURSE, task=path, **SHIP)
