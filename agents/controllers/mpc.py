@@ -401,12 +401,12 @@ class DesignModels:
         self.engine.advance()
 
         self.moved = np.abs(self.read("delta") - before["delta"])
-        self._move(
+        self.move(
             north=self.read("x") - before["x"] + self.north * self.dt,
             east=self.read("y") - before["y"] + self.east * self.dt,
         )
 
-    def _move(self, north: Floats, east: Floats) -> None:
+    def move(self, north: Floats, east: Floats) -> None:
         """Move along and across the path by a way over ground, m."""
         way = np.hypot(north, east)
         ahead, aside = turned(north, east, self.path_course(0.5 * way))

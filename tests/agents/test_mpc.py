@@ -68,7 +68,7 @@ def test_a_ship_that_sails_the_path_is_on_it_beyond_a_right_angle_too(degrees):
         heading = np.clip((along + 0.5 * step - 50.0) / radius, 0.0, angle)
         is_bent = 0.0 < heading < angle
         way = step * (1.0 - is_bent * aside / radius)
-        models._move(way * np.cos(heading), way * np.sin(heading))
+        models.move(way * np.cos(heading), way * np.sin(heading))
     assert models.cross_track == pytest.approx(aside, abs=1.0)
     assert models.along == pytest.approx(along + step, abs=3.0)
     assert models.path_course(0.0) == pytest.approx(angle)

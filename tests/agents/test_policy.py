@@ -86,7 +86,10 @@ def steered_by_hand(policy, rows, starts):
         left -= 1
         change = np.clip(output - in_force, -policy.rate_limit, policy.rate_limit)
         in_force = in_force + change
-        actions.append(np.clip(proposed + policy.authority * in_force, -1.0, 1.0))
+        action = np.clip(proposed + policy.authority * in_force, -1.0, 1.0)
+        if policy.base is not None:
+            base_state = policy.base.after_order(base_state, action)
+        actions.append(action)
     return np.array(actions)
 
 
