@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from typer import Argument, Option
+from typer import Argument, Exit, Option
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,6 +37,13 @@ def new_ship_command(
             help="Length between perpendiculars, m; or fill it in later.",
         ),
     ] = None,
+    update: Annotated[
+        Path | None,
+        Option(
+            metavar="SHIP.TOML",
+            help="Check this ship file again after a correction; list all faults.",
+        ),
+    ] = None,
 ) -> None:
     """Write a ship file for recorded trials.
 
@@ -47,24 +54,47 @@ def new_ship_command(
     from shipgym.files import write_text
     from shipgym.pages import render
 
+    if update is not None:
+        _check_again(update)
+        return
     if not logs:
         raise InputError("new-ship: expected a log, got none; name its file")
     if out.exists():
         raise InputError(
-            f"{out}: exists already; choose another name with --out, or remove it"
+            f"{out}: exists already; choose another name with --out, remove it, or"
+            f" check it again: shipgym new-ship --update {out}"
         )
     guessed = _guess_trials(logs)
     facts = _facts(guessed, out) | {"length": length}
     ship_file = render("shipgym.pages/ship.toml.jinja", **facts)
     write_text(ship_file, out)
 
-    read = [one.trial for one in guessed if one.trial is not None]
-    notes = list(dict.fromkeys(note for trial in read for note in trial.notes))
+    notes = _notes(guessed)
     answer({"written": str(out), **_fields(guessed[0], facts), "notes": notes})
     summary = render("shipgym.pages/new_ship.txt.jinja", **facts)
     say(summary.strip())
     for note in notes:
         warn(note)
+
+
+def _notes(guessed: list[TrialGuess]) -> list[str]:
+    """Notes of all logs that were read, each once."""
+    read = [one.trial for one in guessed if one.trial is not None]
+    return list(dict.fromkeys(note for trial in read for note in trial.notes))
+
+
+def _check_again(path: Path) -> None:
+    """Read all trials of a ship file; exit code 1 where one cannot be read."""
+    from agents.cli.terminal import answer, say
+    from shipgym.trials.ship_file import ShipFile
+
+    faults = ShipFile.load(path).faults()
+    answer({"checked": str(path), "faults": faults})
+    for fault in faults:
+        say(f"to correct: {fault}")
+    if faults:
+        raise Exit(1)
+    say(f"{path}: all trials are read; next: shipgym look {path}")
 
 
 def _fields(first: TrialGuess, facts: dict[str, Any]) -> dict[str, Any]:
@@ -180,24 +210,28 @@ def _entry(
     return {
         "file": _toml_paths(guess.paths, folder),
         "columns": [] if shared else guess.columns,
-        "manoeuvres": _manoeuvres(guess),
+        "cut": _cut(guess),
         "decision": next(iter(of_trial), None),
     }
 
 
-def _manoeuvres(guess: TrialGuess) -> int:
-    """Number of trials in a log by its rudder, where it is idle for long; else none."""
+def _cut(guess: TrialGuess) -> str:
+    """Runs between gaps, or "rudder" in a log that is idle for long; else empty."""
     import numpy as np
 
-    from shipgym.trials.cuts import active_stretches
+    from shipgym.trials.cuts import active_stretches, runs
 
     trial = guess.trial
     if trial is None or "delta" not in trial:
-        return 0
+        return ""
+    between_gaps = runs(trial.t)
+    if len(between_gaps) > 1:
+        return json.dumps(between_gaps)
     stretches = active_stretches(trial.t, trial["delta"])
     active = sum(last - first for first, last in stretches)
     is_idle = abs(float(np.median(trial["delta"]))) < 0.05  # rad
-    return len(stretches) if is_idle and active < trial.duration / 1.5 else 0
+    is_cut = stretches and is_idle and active < trial.duration / 1.5
+    return '"rudder"' if is_cut else ""
 
 
 def _guess_trials(logs: list[Path]) -> list[TrialGuess]:

@@ -8,7 +8,7 @@ from shipgym.arrays import Floats
 from shipgym.checks import shown
 from shipgym.errors import InputError
 from shipgym.trials.clock_texts import DAY, clock_text, is_dated, read_clock
-from shipgym.trials.resampling import FEWEST_SAMPLES, Log
+from shipgym.trials.resampling import FEWEST_SAMPLES, Log, usual_step
 from shipgym.trials.units import DEGREE
 
 _EXPECTED = (
@@ -93,6 +93,13 @@ def _seconds(moment: float | str, log: Log, where: str) -> float:
     after %= DAY
     is_before = after >= log.t[-1] + 0.5 * DAY
     return after - DAY if is_before else after
+
+
+def runs(t: Floats) -> list[list[float]]:
+    """First and last time, s, of the parts of a log between long gaps."""
+    is_gap = np.diff(t) > max(60.0, 20.0 * usual_step(t))
+    parts = np.split(t, np.flatnonzero(is_gap) + 1)
+    return [[float(one[0]), float(one[-1])] for one in parts if np.ptp(one) > _SHORTEST]
 
 
 def active_stretches(t: Floats, delta: Floats | None) -> list[list[float]]:

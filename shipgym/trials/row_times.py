@@ -28,6 +28,9 @@ _COMPACT = re.compile(
 )
 
 
+_PAUSE_S = 600.0  # put between the runs of a file
+
+
 class RowTimes(NamedTuple):
     """Times of the rows of a table."""
 
@@ -55,7 +58,7 @@ def read_times(table: LogTable, column: Column) -> RowTimes:
         if column.unit.endswith("days"):
             clock = np.round(clock, 3)  # days have some nine decimals
         clock += _EPOCHS.get(column.unit, 0.0)
-    clock = _spread(clock, notes)
+    clock = _one_after_another(_spread(clock, notes), notes)
     if is_numeric and column.unit not in _EPOCHS:
         return RowTimes(clock, column.unit, start=None, notes=notes)
     known = clock[np.isfinite(clock)]
@@ -126,3 +129,26 @@ def _spread(clock: Floats, notes: list[str]) -> Floats:
     )
     group = np.repeat(np.arange(firsts.size), sizes)
     return spread_evenly(group, moments, tick, usual)
+
+
+def _one_after_another(clock: Floats, notes: list[str]) -> Floats:
+    """Times of several runs in one file, each after the one before with a pause.
+
+    Where time goes back between runs of 20 rows or more; a clock that is set back by
+    less than 10 s or an hour is left to the check that time increases.
+    """
+    goes_back = np.diff(clock) < 0.0
+    starts = np.flatnonzero(goes_back) + 1
+    back = clock[starts - 1] - clock[starts]
+    rows = np.diff(starts, prepend=0, append=clock.size)
+    is_hour = (back > 1700.0) & (back < 3700.0)
+    is_clock = is_hour | (back < 10.0) | np.isinf(back)
+    if not starts.size or is_clock.any() or rows.min() < 20:
+        return clock
+    notes.append(
+        f"time goes back by {back[0]:.6g} s: another run begins; the {rows.size} runs"
+        f" are read {_PAUSE_S:g} s after each other"
+    )
+    shifts = np.zeros_like(clock)
+    shifts[starts] = back + _PAUSE_S
+    return clock + np.cumsum(shifts)

@@ -115,6 +115,17 @@ class ShipFile:
             for trial in self._read(entry)
         ]
 
+    def faults(self) -> list[str]:
+        """What is left to decide, and what is wrong with each log; empty if nothing."""
+        faults = [*self.undecided]
+        for entry in self.entries:
+            try:
+                if entry.use != "skip":
+                    self._read(entry)
+            except InputError as error:
+                faults.append(str(error))
+        return faults
+
     def trial(self, file: str) -> Trial:
         """Read one trial by its ``file``, whatever its use; of a cut log the first."""
         files = [entry.file for entry in self.entries]

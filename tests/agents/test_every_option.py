@@ -41,6 +41,7 @@ LEARNING = "--settings ppo.toml --total-steps 32"
 #: exit code; every command also takes --json and --quiet.
 LINES = (
     ("new-ship zigzag_15_15.csv --length 160.9 --out new.toml", 0),
+    ("new-ship --update new.toml", 0),
     ("look ship.toml --out look.html", 0),
     (f"identify ship.toml {LINEAR} --out linear", 0),
     (f"identify ship.toml {GREY} --set kernel=rbf --out grey", 0),

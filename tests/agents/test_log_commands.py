@@ -214,3 +214,25 @@ def test_a_yaw_rate_alone_needs_the_service_speed(log, monkeypatch, capsys):
     _, said = command(monkeypatch, capsys, "new-ship", "rate.csv", "--length", "9")
     assert "to decide: speed: the service speed" in said
     assert 'speed = "decide"' in (log / "ship.toml").read_text()
+
+
+def test_runs_in_one_file_are_cut_and_checked_again(log, monkeypatch, capsys):
+    rows = [
+        f"{k % 200};{30.0 + 0.1 * (k % 200)};{9.0 * (-1) ** (k // 20)}"
+        for k in range(400)
+    ]
+    (log / "two.csv").write_text("\n".join(["t [s];Heading [deg];Rudder [deg]", *rows]))
+    _, said = command(monkeypatch, capsys, "new-ship", "two.csv", "--length", "9")
+    assert "time goes back by 199 s: another run begins" in said
+    text = (log / "ship.toml").read_text()
+    assert "cut = [[0.0, 199.0], [799.0, 998.0]]" in text
+    text = text.replace('"decide"', '"starboard"').replace(
+        "# speed = 7.7", "speed = 7.7"
+    )
+    (log / "ship.toml").write_text(text)
+    assert len(ShipFile.load(log / "ship.toml").trials()) == 2
+    again = "new-ship", "--update", "ship.toml"
+    assert command(monkeypatch, capsys, *again)[0] == 0
+    (log / "ship.toml").write_text(text.replace("Rudder [deg]", "Ruder"))
+    code, said = command(monkeypatch, capsys, *again)
+    assert (code, "to correct: ship.toml: [[trials]] 1" in said) == (1, True)

@@ -84,3 +84,4 @@ def test_files_that_do_not_overlap_are_no_log(tmp_path):
     ship_file = ShipFile.load(tmp_path / "ship.toml")
     with pytest.raises(InputError, match="begins 7200 s after it and does not overlap"):
         ship_file.trials()
+    assert len(ship_file.faults()) == 1

@@ -215,3 +215,13 @@ file = ["att.csv", "nav.csv"]
     ship_file.write_text(content.replace("FILE", ""))
     with pytest.raises(InputError, match="name the file of the one to read"):
         ShipFile.load(ship_file).trials()
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_column_that_moves_before_the_heading_is_asked_about(tmp_path, sign):
+    columns = plain()
+    rudder = sign * np.array(columns["Rudder"], dtype=float)
+    text = table(["Time", "Heading", "XQ7"], T, columns["Heading"], rudder)
+    (decision,) = guessed(tmp_path, text).decisions
+    assert decision.key == "delta"
+    assert 'column = "XQ7", unit = "deg"' in decision.choices

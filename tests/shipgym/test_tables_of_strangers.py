@@ -186,6 +186,9 @@ def test_a_steering_command_stands_for_the_rudder(tmp_path, names, edit):
         (b"\xa3\x95\x80\x80", "of ArduPilot or PX4; write its messages as CSV"),
         (b"<?xml version='1.0'?><gpx>", "a track (GPX or KML) without rudder"),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "(.xls); save it as .xlsx"),
+        (b"<!DOCTYPE html>", "a web page, a PDF or a ship file; name a log"),
+        (b"%PDF-1.7\n\xe2", "a web page, a PDF or a ship file; name a log"),
+        (b"# by new-ship\n\n[ship]\n", "a web page, a PDF or a ship file; name a log"),
     ],
 )
 def test_a_foreign_file_is_named_with_what_reads_it(tmp_path, content, words):

@@ -7,13 +7,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from shipgym.arrays import Floats
 from shipgym.checks import quoted, shown
 from shipgym.errors import InputError
 from shipgym.trials.columns import ColumnGuess
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.guesses.columns import RUDDERS, guess_columns
 from shipgym.trials.guesses.speeds import settle_speeds
-from shipgym.trials.guesses.units import UNKNOWN
+from shipgym.trials.guesses.units import UNKNOWN, unit_by_size
 from shipgym.trials.readers.cell_texts import number_with_side
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable
@@ -145,6 +148,8 @@ def guess_trial(path: str | Path, *others: str | Path) -> TrialGuess:
         _guess_tables(guess)
     _take_frame(guess)
     guess.trial = _trial_by_proposals(guess)
+    if guess.trial is not None and guess.trial.channels.keys().isdisjoint(RUDDERS):
+        guess.decisions += _rudder_by_behaviour(guess)
     if guess.trial is None:
         guess.conventions = []
         return guess
@@ -224,6 +229,34 @@ def _ask_for_missing(guess: TrialGuess) -> None:
                 f' {{ column = "...", unit = "{unit}" }}'
             )
             guess.decisions.append(Decision("columns", channel, choices))
+
+
+def _rudder_by_behaviour(guess: TrialGuess) -> list[Decision]:
+    """A decision on a column within 40 that moves before the heading turns."""
+    for table in guess.tables:
+        for name in table.header:
+            values = table.likely_numbers(name)
+            if values is None or name not in guess.unused or not _is_small(values):
+                continue
+            unit = unit_by_size(values, "delta").unit
+            rudder = ColumnGuess(name, unit, channel="delta")
+            columns = [*guess.columns, rudder]
+            candidate = TrialGuess(guess.tables, columns, [*guess.conventions])
+            trial = _trial_by_proposals(candidate)
+            side = _rudder_side(candidate, trial) if trial is not None else None
+            if side is not None and side.side is not None:
+                choices = (
+                    "likely the rudder, as it moves before the heading turns:"
+                    f" {rudder.declaration}"
+                )
+                return [Decision("columns", "delta", choices)]
+    return []
+
+
+def _is_small(values: Floats) -> bool:
+    """Return whether values are to both sides of zero and within 40."""
+    known = values[np.isfinite(values)]
+    return bool(-40.0 <= known.min(initial=0.0) < 0.0 < known.max(initial=0.0) <= 40.0)
 
 
 def _rudder_side(guess: TrialGuess, trial: Trial) -> RudderSide | None:
