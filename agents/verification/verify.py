@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ from identification.progress import Progress
 from shipgym.arrays import Flags
 from shipgym.checks import quoted
 from shipgym.errors import InputError
+from shipgym.manoeuvres.criteria import Criterion
 from shipgym.manoeuvres.imo import assess_draws
 from shipgym.manoeuvres.quantiles import upper_95
 from shipgym.models import ShipModel
@@ -60,24 +61,19 @@ def verify(
     criteria = assess_draws(
         model, loop.draws, lambda done: tell("models drawn", done, draws)
     )
-    drawn = {name: one.drawn for name, one in criteria.items() if one.drawn is not None}
-    unstable = np.any([one.ran_away for one in drawn.values()], axis=0)
+    criteria = {name: one for name, one in criteria.items() if one.drawn is not None}
+    unstable = ran_away(criteria)
     stable = [loop.draws[number] for number in np.flatnonzero(~unstable).tolist()]
 
-    steered: list[tuple[Agent, Episodes]] = []
-    for pilot in designed.controllers:
-        episodes = loop.sail(pilot)
-        loop.look_at(episodes.terminated)
-        steered.append((pilot, episodes))
     tracks = [loop.led(guide) for guide in designed.guides]
     for track in tracks:
         loop.look_at(lost_tracks(track))
-    steered += [(guest, loop.sail(guest)) for guest in guests]
+    steered = sailed(loop, designed.controllers, guests)
     pilots = run_pilots(steered, [model, *stable], tell)
     return Verification(
         draws=draws,
         seed=seed,
-        criteria={name: criteria[name] for name in drawn},
+        criteria=criteria,
         unstable=unstable,
         course_unstable=np.array([not keeps_course(draw) for draw in loop.draws]),
         nomoto=nomoto(model),
@@ -86,6 +82,24 @@ def verify(
         tracks=tuple(loop.of_counted(track) for track in tracks),
         counted=loop.counted,
     )
+
+
+def ran_away(criteria: Mapping[str, Criterion]) -> Flags:
+    """Draws that run away in a manoeuvre of the criteria."""
+    drawn = [one.drawn.ran_away for one in criteria.values() if one.drawn is not None]
+    return np.asarray(np.any(drawn, axis=0))
+
+
+def sailed(
+    loop: ClosedLoop, designed: Sequence[Controller], guests: Sequence[Agent]
+) -> list[tuple[Agent, Episodes]]:
+    """Autopilots with their episodes; a draw counts by those of designs, not guests."""
+    found: list[tuple[Agent, Episodes]] = []
+    for pilot in designed:
+        episodes = loop.sail(pilot)
+        loop.look_at(episodes.terminated)
+        found.append((pilot, episodes))
+    return found + [(guest, loop.sail(guest)) for guest in guests]
 
 
 def keeps_course(model: ShipModel) -> bool:
