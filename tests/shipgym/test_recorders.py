@@ -89,6 +89,7 @@ ODD = {
         "",
         "'4O.2' is no number",
     ),
+    "bearings": (plain(Heading=[f"{one.psi:.1f} T" for one in SHIP]), "", ""),
     "commas": (
         plain(
             Heading=[f"{one.psi:.2f}".replace(".", ",") for one in SHIP],

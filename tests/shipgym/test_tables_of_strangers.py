@@ -88,6 +88,11 @@ def assert_as_sailed(guess, *, positive="starboard", speeds=True):
 
 READ = {
     "knots": (as_is, {}, "sog: in knots"),
+    "13.6 kn": (
+        lambda k, row: [*row[:3], f"{row[3]} kn", *row[4:]],
+        {},
+        "sog: in knots",
+    ),
     "km/h": (speed(1.852), {}, "sog: in km/h"),
     "titles": (as_is, {"above": ["Trial, of A, B, C, D, E, F", "", "x", "# y"]}, ""),
     "units": (

@@ -21,6 +21,7 @@ from shipgym.trials.guesses.units import (
     unit_by_size,
     unknown_unit,
 )
+from shipgym.trials.readers.cell_texts import units_in_cell
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.units import QUANTITIES, split_unit
 
@@ -185,7 +186,9 @@ def _unit_where_fitting(table: LogTable, column: str, channel: str) -> UnitGuess
         unit = UnitGuess(glued[1]) if glued else None
     if unit is not None and (channel != "t" or _is_duration(table, column, unit)):
         return unit
-    return _unit_by_cells(table, column, channel)
+    in_cells = units_in_cell(table.first_text(column))
+    named = named_unit(in_cells, channel, "from its cells")
+    return named or _unit_by_size(table, column, channel)
 
 
 def _is_no_measurement(name: str, channel: str) -> bool:
@@ -197,7 +200,7 @@ def _is_no_measurement(name: str, channel: str) -> bool:
     return may_be_ordered and not words.isdisjoint(_NO_MEASUREMENT)
 
 
-def _unit_by_cells(table: LogTable, column: str, channel: str) -> UnitGuess:
+def _unit_by_size(table: LogTable, column: str, channel: str) -> UnitGuess:
     """Unit of a column whose name tells none, by its recorder or its values."""
     if _SIGNAL_K.match(column) and channel not in ("t", "lat", "lon"):
         size = unit_by_size(None, channel)

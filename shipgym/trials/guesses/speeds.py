@@ -45,7 +45,7 @@ def settle_speeds(
 
 def _is_known(guess: ColumnGuess) -> bool:
     """Return whether the log itself names the unit of a speed."""
-    elsewhere = ("from the row of", "paths")
+    elsewhere = ("from the row of", "from its cells", "paths")
     return guess.is_named or guess.reason.startswith(elsewhere)
 
 

@@ -2,6 +2,8 @@
 
 import re
 
+from shipgym.trials.units import spelled_units
+
 #: Words that stand for "no value"; so does a text of dashes or other signs alone.
 _MISSING_WORDS = re.compile(
     r"-?nan(\(ind\))?|#?n\.?/?a\.?|\(?null\)?|nil|none|nat|<na>|no ?data|no value"
@@ -39,9 +41,18 @@ def is_number(text: str) -> bool:
 
 
 def cell_number(text: str) -> float | None:
-    """A number, with a side or without; None for other text."""
+    """A number, with a side or a unit or neither; None for other text."""
     text = text.replace("\u2212", "-")  # a minus as typographers write it
+    if units_in_cell(text):
+        text = text.split()[0]
     return float(text) if is_number(text) else number_with_side(text)
+
+
+def units_in_cell(text: str) -> list[str]:
+    """Units that may stand behind a number such as "13.6 kn"; else none."""
+    number, _, unit = text.partition(" ")
+    unit = "deg" if unit == "T" else unit.lower()  # a bearing from true north
+    return spelled_units(unit) if is_number(number) else []
 
 
 def number_with_side(text: str) -> float | None:
