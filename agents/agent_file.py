@@ -9,7 +9,7 @@ from agents.controllers.controller import Controller
 from agents.controllers.controller_file import LEARNED, REMEDY, read_controller
 from shipgym import InputError, ShipModel
 from shipgym.checks import did_you_mean
-from shipgym.files import read_json
+from shipgym.files import expecting, read_json
 
 if TYPE_CHECKING:
     from agents.policies.policy import LearnedPolicy
@@ -46,15 +46,15 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
             f"{path}: expected a file that runs no code, got one of stable-baselines3;"
             " load it there, and write LearnedPolicy.from_sb3(agent).save('agent.json')"
         )
-    content = read_json(file, "controller file", REMEDY)
-
     agent: Agent
-    if content.get("kind") == LEARNED:
-        from agents.policies.policy_file import read_policy
+    with expecting("controller file", file):
+        content = read_json(file, "controller file", REMEDY)
+        if content.get("kind") == LEARNED:
+            from agents.policies.policy_file import read_policy
 
-        agent = read_policy(content, file)
-    else:
-        agent = read_controller(content, str(path))
+            agent = read_policy(content, file)
+        else:
+            agent = read_controller(content, str(path))
 
     if model is not None:
         agent.check_fits_model(model)

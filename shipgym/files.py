@@ -34,7 +34,22 @@ DEEPEST = 20  # levels of lists and tables within each other
 LONGEST_KEY = 4096  # characters
 LARGEST_NUMBER = 1e100  # magnitude: products of three such numbers are still finite
 
-RESULTS = ("model.json", "agent.json", "ship.toml")
+#: Kinds of files that users mistake for one another, and the commands that take them.
+TAKEN_BY = {
+    "log": "new-ship or look",
+    "ship file": "look, identify or autopilot",
+    "model file": "trials, export or train --model",
+    "controller file": "export or benchmark --controllers",
+    "recorded episode": "replay",
+    "Python file": "benchmark --controllers as FILE:FUNCTION",
+}
+KIND_OF_SUFFIX = {"": "", ".toml": "ship file", ".py": "Python file"}
+#: Fields that only files of a kind have.
+KIND_OF_FIELD = {
+    "coefficients": "model file",
+    "observation_scales": "controller file",
+    "actions": "recorded episode",
+}
 
 #: Characters that UTF-8 cannot encode, or that end a text for the operating system.
 _UNWRITABLE = re.compile("[\0\ud800-\udfff]")
@@ -116,10 +131,9 @@ def _opened(path: Path, what: str) -> Iterator[BinaryIO]:
     try:
         kind = path.stat().st_mode
         if not stat.S_ISREG(kind):
-            found = "no regular file (a device, a pipe or a socket)"
-            if stat.S_ISDIR(kind):
-                inside = [one for one in RESULTS if (path / one).is_file()]
-                found = f"a folder; give {path / inside[0]}" if inside else "a folder"
+            is_folder = stat.S_ISDIR(kind)
+            special = "no regular file (a device, a pipe or a socket)"
+            found = "a folder" if is_folder else special
             raise InputError(f"{path}: expected a {what}, got {found}")
         with path.open("rb") as file:
             yield file
@@ -219,6 +233,51 @@ def _named_value(name: str, text: str, where: str) -> Any:
             value = float(text)  # such as .5 or nan
         check_content({name: value}, where, infinite=True)
     return value
+
+
+# ---- files of another kind
+
+
+@contextmanager
+def expecting(what: str, path: Path) -> Iterator[None]:
+    """Where a file cannot be read, say if it is of another kind than `what`.
+
+    In a folder the file that was meant is named.
+    """
+    try:
+        yield
+    except InputError:
+        found = ""
+        with suppress(OSError):
+            found = _found_instead(what, path)
+        if not found:
+            raise
+        raise InputError(f"{path}: expected a {what}, got {found}") from None
+
+
+def _found_instead(what: str, path: Path) -> str:
+    """Say what a path is instead of a file of a kind; empty if that is not known."""
+    is_folder = path.is_dir()
+    files = sorted(path.iterdir(), reverse=True) if is_folder else [path]
+    kinds = {kind_of(file): file for file in files}
+    kinds.pop("", None)
+    if what in kinds:
+        return f"a folder; give {kinds[what]}" if is_folder else ""
+    for kind, file in kinds.items():
+        given = f"a folder; give {file}" if is_folder else f"a {kind}; give it"
+        return f"{given} to shipgym {TAKEN_BY[kind]}"
+    return ""
+
+
+def kind_of(path: Path) -> str:
+    """Kind of a file by its name's end or its fields; empty where it is not known."""
+    suffix = path.suffix.lower()
+    if suffix != ".json":
+        return KIND_OF_SUFFIX.get(suffix, "log") if path.is_file() else ""
+    with suppress(InputError):
+        content = read_json(path, "file", "")
+        return next((KIND_OF_FIELD[one] for one in KIND_OF_FIELD if one in content), "")
+    return ""
 
 
 # ---- limits of what JSON and TOML hold

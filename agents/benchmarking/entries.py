@@ -234,11 +234,15 @@ def _check_text(text: str) -> None:
             f"controllers: expected {text}:function, which makes a controller for a"
             f" task, got '{text}'"
         )
-    elif not _matching_files(text):
-        raise InputError(
-            f"controllers: expected one of {quoted(known)}, an existing file of an"
-            f" agent, or module:function, got '{text}'.{did_you_mean(text, known)}"
-        )
+    else:
+        files = _matching_files(text)
+        if not files:
+            raise InputError(
+                f"controllers: expected one of {quoted(known)}, an existing file of an"
+                f" agent, or module:function, got '{text}'.{did_you_mean(text, known)}"
+            )
+        for file in files:
+            load_agent(file)
 
 
 def _check_object(source: Any, name: str) -> None:

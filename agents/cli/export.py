@@ -80,14 +80,11 @@ def _source(what: str, name: str | None, depth: float) -> Source:
     from agents.export.autopilot_c99 import autopilot_source
     from agents.export.ship_c99 import ship_source
     from shipgym.errors import InputError
-    from shipgym.files import read_json
+    from shipgym.files import kind_of
     from shipgym.models import load_model
 
     file = Path(what)
-    is_agent = what in list_pretrained()
-    if file.suffix == ".json":
-        expected = "file of a controller or a model"
-        is_agent |= "kind" in read_json(file, expected, "take another copy")
+    is_agent = what in list_pretrained() or kind_of(file) == "controller file"
     if not is_agent:
         return ship_source(load_model(what), name or file.stem, depth)
     if depth != inf:

@@ -26,7 +26,7 @@ from shipgym.checks import (
     unexpected,
 )
 from shipgym.errors import InputError
-from shipgym.files import read_json, write_json
+from shipgym.files import expecting, read_json, write_json
 from shipgym.models import ShipModel
 from shipgym.tasks.guidance import Path as PlannedPath
 from shipgym.tasks.guidance import track
@@ -214,8 +214,8 @@ class Episode:
         Raises InputError, naming the file and the field at fault.
         """
         remedy = "record the episode again or take another copy"
-        content = dict(read_json(Path(path), "recorded episode", remedy))
-        with placed(str(path)):
+        with expecting("recorded episode", Path(path)), placed(str(path)):
+            content = dict(read_json(Path(path), "recorded episode", remedy))
             kind = content.pop("kind", None)
             if kind != KIND:
                 remedy = "choose a file that RecordEpisode wrote"

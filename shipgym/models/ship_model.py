@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from shipgym.arrays import Floats
 from shipgym.checks import placed
 from shipgym.errors import InputError
-from shipgym.files import read_json, write_json
+from shipgym.files import expecting, read_json, write_json
 from shipgym.models.model_file import read_model
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 
@@ -165,12 +165,8 @@ class ShipModel(ManoeuvringModel):
         """Read a model file; InputError, naming the file and the field at fault."""
         file = Path(path)
         remedy = "identify the model again or take another copy"
-        fields = read_json(
-            file,
-            "model file",
-            remedy,
-        )
-        return cls.from_dict(fields, str(file))
+        with expecting("model file", file):
+            return cls.from_dict(read_json(file, "model file", remedy), str(file))
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any], where: str = "model") -> Self:

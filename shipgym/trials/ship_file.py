@@ -8,7 +8,7 @@ from typing import Any, Self
 
 from shipgym.checks import check_choice, check_keys, check_table, data_only, placed
 from shipgym.errors import InputError
-from shipgym.files import LARGEST_TOML, parse_toml, read_text, read_toml
+from shipgym.files import LARGEST_TOML, expecting, parse_toml, read_text, read_toml
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import own_structure
@@ -183,7 +183,8 @@ def _read_decided(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
 
     A message names the line of the file and, from its comment, the choices.
     """
-    data = read_toml(path, "ship file")
+    with expecting("ship file", path):
+        data = read_toml(path, "ship file")
     lines = read_text(path, "ship file", LARGEST_TOML).splitlines()
     messages = []
     for number, line in enumerate(lines, start=1):

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from shipgym.errors import InputError
-from shipgym.files import LARGEST_CSV, read_bytes, shipped_toml
+from shipgym.files import LARGEST_CSV, expecting, read_bytes, shipped_toml
 from shipgym.trials.readers.csv_file import read_csv
 from shipgym.trials.readers.frames import read_excel, read_parquet
 from shipgym.trials.readers.log_table import LogTable
@@ -71,8 +71,9 @@ def read_log(path: str | Path | LogTable) -> LogTable:
     if isinstance(path, LogTable):
         return path
     path = Path(path)
-    content = read_bytes(path, "log", LARGEST_CSV)
-    kind = recognise_kind(path, content)
+    with expecting("log", path):
+        content = read_bytes(path, "log", LARGEST_CSV)
+        kind = recognise_kind(path, content)
     if kind == "messages":
         from shipgym.trials.readers.message_log import read_messages  # with its tables
 
