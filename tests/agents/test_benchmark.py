@@ -359,7 +359,8 @@ def test_a_suite_of_ones_own_is_run_as_a_shipped_one(own):
     result = load_results(own / "out")
     assert result.ranking == ["helm", "lq"]
     assert result.tasks == ("fairway", "narrow")
-    assert (result.figures("helm", "fairway", "success") == 1.0).all()
+    # 20 steps do not lead her past the zone
+    assert (result.figures("helm", "fairway", "success") == 0.0).all()
     # the rule cannot steer this ship by her shaft too: there are no scores
     assert result.summary["ranking"]["steering"][0]["scores"]["ship"]["value"] is None
     about = result.summary["suite"]["tasks"]["narrow"]
