@@ -51,14 +51,15 @@ class Cell:
         each of shape (n_runs, n_episodes).
     failures : mapping of str to str
         By set of episodes, how the controller failed first, if it did.
-    ship_steps : float
-        Steps of simulated ships that making a run took.
+    ship_steps, seconds : float
+        Steps of simulated ships, and processor time, that making a run took.
     """
 
     refused: str = ""
     figures: Mapping[str, Figures] = field(default_factory=dict)
     failures: Mapping[str, str] = field(default_factory=dict)
     ship_steps: float = 0.0
+    seconds: float = 0.0
 
     def table(self, controller: str, task: str, options: Options) -> pd.DataFrame:
         """Return a row for each set, run and episode, with its seed."""
@@ -112,6 +113,7 @@ def run_cell(entry: Entry, task: BenchmarkTask, options: Options) -> Cell:
         figures=figures,
         failures=failures,
         ship_steps=made.ship_steps,
+        seconds=made.seconds,
     )
 
 

@@ -20,6 +20,7 @@ Runs are the unit: what searches or learns is made several times. A function tha
 import glob
 import hashlib
 import inspect
+import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -63,10 +64,13 @@ class Made(NamedTuple):
     policies : list of Policy
     ship_steps : float
         Control intervals that ships were simulated for, mean over the runs.
+    seconds : float
+        Of processor, mean over the runs.
     """
 
     policies: list[Policy]
     ship_steps: float
+    seconds: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,13 +108,15 @@ class Entry:
         """
         where = f"'{self.name}' on task '{task.name}'"
         given = task.design_task
-        before = Engine.ship_steps
+        before, began = Engine.ship_steps, time.process_time()
         policies = _policies(self.source, given, runs)
+        seconds = (time.process_time() - began) / len(policies)
         steps = (Engine.ship_steps - before) / len(policies)
         if self.is_text and self.source.startswith(TUNED):
             kind = _kind(self.source.removeprefix(TUNED), given)
             found = tuned_runs(kind, given, given.suite)
             steps = float(np.mean([run.get("ship_steps", 0) for run in found]))
+            seconds = float(np.mean([run.get("seconds", 0.0) for run in found]))
         if steps > budget:
             raise InputError(
                 f"{where}: expected at most {budget:,.0f} ship steps in making a run,"
@@ -124,7 +130,7 @@ class Entry:
                     f"{where}: expected a design on the model '{task.model}', got one"
                     f" on the ship '{task.true_ship}'"
                 )
-        return Made(policies, steps)
+        return Made(policies, steps, seconds)
 
     def fingerprint(self, task: BenchmarkTask) -> dict[str, str]:
         """Return the SHA-256 of each file that it is made from for a task, by path."""

@@ -276,18 +276,19 @@ def _about_entry(
     for task in tasks:
         files |= entry.fingerprint(task)
     refused = {}
-    steps = []
+    made = []
     for task in tasks:
         cell = cells[entry.name, task.name]
         if cell.refused:
             refused[task.name] = cell.refused
         else:
-            steps.append(cell.ship_steps)
+            made.append(cell)
     return {
         "source": entry.source if entry.is_text else None,
         "files": files,
         "refused": refused,
-        "ship_steps": float(np.mean(steps or [0.0])),
+        "ship_steps": float(np.mean([cell.ship_steps for cell in made] or [0.0])),
+        "seconds": float(np.mean([cell.seconds for cell in made] or [0.0])),
     }
 
 
