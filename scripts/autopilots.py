@@ -20,6 +20,7 @@ import itertools
 import sys
 import warnings
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,7 @@ from shipgym.tasks import course_keeping_task, path_following_task
 from tests.ships.foreign import FOREIGN
 
 STRUCTURES = ("nomoto", "abkowitz", "mmg", "auto")
+COMPARED = (*DESIGNS, "wheel-over")
 DRAWS = 60
 FIRST_SEED = 2_000_000  # of the paths; a search's begin at 500,000
 PATHS = 25  # in each of the currents
@@ -52,9 +54,8 @@ def case(name: str, structure: str, seed: int) -> Row:
         fit = identified(ship, structure, sea_trials(ship, seed))
     except InputError as error:
         return row | {"failed": str(error)}
-    result = examined(
-        None, fit, [], lambda: verify(fit.model, DRAWS, 0, trials=fit.trials)
-    )
+    verified = partial(verify, fit.model, DRAWS, 0, designs=COMPARED, trials=fit.trials)
+    result = examined(None, fit, [], verified)
     row["chosen"] = fit.model.structure
 
     found = result.verification
@@ -72,7 +73,7 @@ def case(name: str, structure: str, seed: int) -> Row:
 def designed(model: ShipModel) -> list[Controller]:
     """Designs on a model that is refused as a whole."""
     try:
-        found = design_autopilots(model, DESIGNS)
+        found = design_autopilots(model, COMPARED)
     except InputError:
         return []
     return [*found.controllers, *found.guides]

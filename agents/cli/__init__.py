@@ -25,6 +25,7 @@ try:
     from agents.cli.command import (
         FAILED,
         INTERRUPTED,
+        CommandGroup,
         report_os_error,
         shared_options,
     )
@@ -42,6 +43,7 @@ except KeyboardInterrupt:  # Ctrl-C before any command began
     sys.exit(130)
 
 app = typer.Typer(
+    cls=CommandGroup,
     epilog=(
         "Example: shipgym new-ship zigzag.csv, then shipgym autopilot ship.toml --out"
         " report/"

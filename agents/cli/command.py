@@ -11,6 +11,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 from typer import Argument, Option
+from typer.core import TyperGroup
 
 from agents.cli.parameters import take_parameters, typed_parameters
 
@@ -42,6 +43,18 @@ Json = Annotated[
 Quiet = Annotated[
     bool, Option("--quiet", "-q", help="Print only errors, and the result with --json.")
 ]
+
+
+class CommandGroup(TyperGroup):
+    """The commands; an empty argument is refused before any of them runs."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> Any:
+        """Refuse arguments that are empty."""
+        for text in args:
+            name, sign, value = text.partition("=")
+            if not text or (sign and not value and name.startswith("--")):
+                ctx.fail(f"{name or 'argument'}: expected a non-empty string, got ''")
+        return super().parse_args(ctx, args)
 
 
 def shared_options(command: Callable[..., None]) -> Callable[..., None]:

@@ -124,6 +124,10 @@ class RMSVM(LinearRegressor):
         """The insensitive band, where none is given a tenth."""
         return FIRST_BAND if self.epsilon is None else float(self.epsilon)
 
+    def error(self, model: ShipModel, trial: Trial) -> float:
+        """What the search for weight and bands makes small."""
+        return heading_error(model, trial)
+
     def fit_equations(self, problem: Problem) -> Estimators:
         """Copies fitted to all equations, weight and bands chosen where not given.
 
@@ -226,7 +230,7 @@ class _Tuner:
 
         def error(weight: float) -> float:
             errors = [
-                heading_error(self.model(weight, self.first_bands, rows), held)
+                self.asked.error(self.model(weight, self.first_bands, rows), held)
                 for rows, held in folds
             ]
             return float(np.mean(errors))
@@ -242,7 +246,7 @@ class _Tuner:
 
         def error(bands: Floats) -> float:
             model = self.model(weight, bands.tolist(), self.everything)
-            errors = [heading_error(model, trial) for trial in self.trials]
+            errors = [self.asked.error(model, trial) for trial in self.trials]
             return float(np.mean(errors))
 
         found: list[float] = pattern_search(error, np.array(first)).tolist()

@@ -78,7 +78,7 @@ class AsPrinted(RMSVM):
         strength = len(rows) / weight * np.mean(duration) ** 2
         penalty = np.append(strength * scale**2, 0.0)
         moment = features.T @ features + np.diag(penalty)
-        self.set_covariance(features, targets, moment)
+        self.inverse_moment_ = np.linalg.pinv(moment, hermitian=True)
         return self
 
     def error(self, model: ShipModel, trial: Trial) -> float:

@@ -222,7 +222,7 @@ def test_a_table_of_terms_in_the_ship_file_is_taken_and_stays_with_the_model(shi
             'name = "auto"',
             "got 'auto', which is another structure's",
         ),
-        ('name = "mine"', "", "got no name"),
+        ('name = "mine"', "", "field 'name' is missing"),
         (
             'name = "mine"',
             'name = "mine"\nterms = 3',

@@ -162,7 +162,7 @@ REFUSED = {
     "extractor": (with_extractor, "which commands otherwise than its layers"),
     "activation": (
         made(policy_kwargs={"activation_fn": torch.nn.ELU}, n_steps=8, batch_size=8),
-        "expected ReLU or Tanh .* got ELU",
+        "expected one of 'relu', 'tanh', got 'elu'",
     ),
     "pace": (
         made(env=lambda: ships(frame_stack=2, action_repeat=2)),
