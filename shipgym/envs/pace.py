@@ -56,8 +56,9 @@ class Pace:
         reach = self.action_repeat * self.rate_limit
         gap = float(np.diff(orders).max())
         if reach < gap - 1e-6:
+            least = gap / self.action_repeat
             raise InputError(
-                f"rate_limit: expected at least {gap / self.action_repeat:g} with"
+                f"rate_limit: expected at least {least:g} with"
                 f" discrete orders that are up to {gap:g} apart, got"
                 f" {self.rate_limit:g}, which reaches {reach:g} in a step; raise it"
                 " or action_repeat, or choose a continuous action"

@@ -105,7 +105,8 @@ class RecordEpisode(
         """Write what has been recorded, if there is a step of it."""
         if self._rewards:
             name = f"episode-{self.episode_number:05d}.json"
-            self._episode().save(self._folder / name)
+            path = self._folder / name
+            self._episode().save(path)
         self._rewards = []
 
     def _episode(self) -> Episode:

@@ -102,7 +102,8 @@ def _chances_by_model(
         passes = float(meets.mean())
         fails = float(misses.mean())
     else:
-        passes = float(drawn.value is not None and drawn.value <= limit)
+        is_met = drawn.value is not None and drawn.value <= limit
+        passes = float(is_met)
         fails = 1.0 - passes
 
     if len(inside) < len(sides):

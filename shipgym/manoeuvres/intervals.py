@@ -104,11 +104,12 @@ class IndexInterval:
     def lost_in_words(self) -> str:
         """Say how many draws have no value."""
         draws = len(self.values)
+        of_draws = f"of {draws} draws"
         lost = []
         if self.n_ran_away:
-            lost.append(f"{self.n_ran_away} of {draws} draws ran away")
+            lost.append(f"{self.n_ran_away} {of_draws} ran away")
         if self.n_never_reached:
-            lost.append(f"{self.n_never_reached} of {draws} draws did not finish")
+            lost.append(f"{self.n_never_reached} {of_draws} did not finish")
         return ", ".join(lost)
 
 

@@ -206,7 +206,8 @@ def _heading_change(
 ) -> Floats:
     """Heading at some times less the mean heading up to the start, rad."""
     psi = trial["psi"]
-    approach = psi[trial.t <= start].mean()
+    is_before = trial.t <= start
+    approach = psi[is_before].mean()
     heading = np.interp(times, trial.t, psi)
     return np.asarray(heading - approach)
 

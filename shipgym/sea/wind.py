@@ -76,7 +76,8 @@ def gust_filter(wind: Wind) -> GaussMarkov:
     V = wind.speed
     peak = sqrt(3.0) * V / 1800.0
     variance = HARRIS_VARIANCE * SURFACE_DRAG * V**2
+    time_constant = 1.0 / (2.0 * pi * peak)
     return GaussMarkov(
-        time_constant=1.0 / (2.0 * pi * peak),
+        time_constant=time_constant,
         standard_deviation=sqrt(variance),
     )

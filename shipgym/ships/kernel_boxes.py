@@ -74,9 +74,9 @@ class Kernel:
 
     def __post_init__(self) -> None:
         n = len(self.centres)
-        if not (
-            np.all(self.scale > 0.0) and 0 < n <= SIZES[-1] and len(self.basis) == n
-        ):
+        has_scale = np.all(self.scale > 0.0)
+        has_rows = 0 < n <= SIZES[-1] and len(self.basis) == n
+        if not (has_scale and has_rows):
             shapes = [getattr(self, name).shape for name in SHAPES]
             raise InputError(
                 "kernel: expected a scale above 0, and 1 to"
@@ -101,10 +101,10 @@ class Kernel:
     def from_dict(cls, content: Any, where: str) -> Self:
         """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
         table = check_table(content, where, SHAPES)
-        arrays = {
-            name: check_array(table.get(name), shape, f"{where}.{name}")
-            for name, shape in SHAPES.items()
-        }
+        arrays = {}
+        for name, shape in SHAPES.items():
+            given = table.get(name)
+            arrays[name] = check_array(given, shape, f"{where}.{name}")
         return cls(**arrays)
 
 

@@ -404,8 +404,9 @@ def check_together(values: Mapping[str, float]) -> None:
         if abs(value) > largest:
             squared = " squared" if is_area else ""
             unit = "m2" if is_area else "m"
+            expected = f"at most {share:g} of the length{squared}"
             raise InputError(
-                f"{name}: expected at most {share:g} of the length{squared}, got"
+                f"{name}: expected {expected}, got"
                 f" {value:g} with length {length:g}; check the units ({unit})"
             )
     if "mass" in values:

@@ -172,7 +172,8 @@ class Task:
         if sensors is not None:
             sensors = read_sensors(sensors)
         known = (*others, "reward", *cls.option_names(task, sensors))
-        check_keys(options, dict.fromkeys(known), f"{task.name} options")
+        where = f"{task.name} options"
+        check_keys(options, dict.fromkeys(known), where)
 
         # an option belongs to the task, to all tasks or to the sensor set
         own = _chosen(options, task.settings)
