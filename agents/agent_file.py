@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os.path import isfile
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -73,11 +74,11 @@ def find_agent(name: str | Path) -> Path:
     InputError if it is none of them, with the nearest pretrained name.
     """
     path = Path(name)
-    if path.suffix == ".json" or path.is_file():
+    if path.suffix == ".json" or isfile(path):
         return path
     run_agent = "agent.json"  # of a training's folder
     of_run = path / run_agent
-    if of_run.is_file():
+    if isfile(of_run):
         return of_run
 
     known = list_pretrained()

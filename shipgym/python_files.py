@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from inspect import CO_GENERATOR, CO_VARARGS, CO_VARKEYWORDS
+from os.path import isfile
 from pathlib import Path
 from sysconfig import get_path
 from time import monotonic
@@ -30,7 +31,7 @@ def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
     `expected` says what it is to be, for messages. InputError if there is none, or it
     cannot be executed.
     """
-    if not path.is_file():
+    if not isfile(path):
         raise InputError(f"{path}: expected {expected}, got no such file")
     resolved = path.resolve()
     content = hashlib.sha256(str(resolved).encode() + b"\0" + resolved.read_bytes())

@@ -11,6 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
+from os.path import isdir
 from pathlib import Path
 from typing import Any, Self
 
@@ -298,7 +299,7 @@ def load_results(path: str | Path) -> BenchmarkResult:
     Raises InputError naming the file and the field at fault.
     """
     where = Path(path)
-    if where.is_dir():
+    if isdir(where):
         where = where / RESULTS
     summary = read_json(where, "file of benchmark results", REMEDY)
     if summary.get("kind") != KIND:

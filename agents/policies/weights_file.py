@@ -46,7 +46,7 @@ def weights_path(path: Path) -> Path:
 def read_weights(path: Path, sha256: str) -> Tensors:
     """Weights by name, of the policy at `path` (NAME.json), whose JSON has their hash.
 
-    Raises InputError if they are missing, cut short or those of another policy.
+    Raises InputError if they are missing, broken or those of another policy.
     """
     from safetensors.numpy import load
 
@@ -59,5 +59,10 @@ def read_weights(path: Path, sha256: str) -> Tensors:
             f" {path}, got {found[:12]}... of {len(content)} bytes: cut short, or of"
             f" another policy; {REMEDY}"
         )
-    tensors: Tensors = load(content)
+    try:
+        tensors: Tensors = load(content)
+    except Exception as error:  # of safetensors, and of types that NumPy does not know
+        raise InputError(
+            f"{file}: expected a safetensors file, got a broken one ({error}); {REMEDY}"
+        ) from None
     return tensors

@@ -1,6 +1,7 @@
 """Environments as users name them: by short name, by id, or by a task's file."""
 
 from importlib import import_module
+from os.path import isfile
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -54,7 +55,7 @@ def read_environment(
         return Environment(text, {})
     if text.endswith(".py"):
         path = (folder / text).resolve()
-        if not path.is_file():
+        if not isfile(path):
             raise InputError(
                 f"{where}: expected the file of a task, got no file {path}"
             )

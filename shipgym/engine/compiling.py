@@ -26,6 +26,9 @@ from shipgym.errors import InputError
 # depend on the batch size
 SEMANTICS = {"error_model": "numpy", "fastmath": {"contract"}}
 
+# Numba's own functions leave variables unset where they raise
+NOT_OF_NUMBA = r"(?!(?s:.*)-packages[\\/]numba[\\/])"
+
 #: Compiled functions that loops call, by all that they depend on: loops share them.
 SHARED: dict[Any, Any] = {}
 
@@ -130,7 +133,9 @@ def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
     numba.config.ALWAYS_WARN_UNINIT_VAR = int(hooks.get("CHECKED", True))
     try:
         with warnings.catch_warnings():
-            warnings.filterwarnings("error", ".*uninitialized variable", NumbaWarning)
+            unset = ".*uninitialized variable"
+            warnings.filterwarnings("ignore", unset, NumbaWarning)
+            warnings.filterwarnings("error", unset + NOT_OF_NUMBA, NumbaWarning)
             return numba.njit(signature, nogil=True, **SEMANTICS)(specialised)
     # the latter three: another record than is due, none at all, one whose field is set
     except (

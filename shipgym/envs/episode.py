@@ -30,6 +30,7 @@ from shipgym.files import expecting, read_json, write_json
 from shipgym.models import ShipModel
 from shipgym.tasks.guidance import Path as PlannedPath
 from shipgym.tasks.guidance import track
+from shipgym.trials.clock_texts import DAY
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
 
@@ -120,11 +121,12 @@ class Episode:
             check_flag(getattr(self, name), name)
         if self.success is not None:
             check_flag(self.success, "success")
-        largest = {"rudder_limit": np.pi / 2.0, "beam": self.length}
-        for name in ("dt", "length", *largest, "corridor", "turn_radius"):
+        largest = {"dt": DAY, "rudder_limit": np.pi / 2.0, "beam": self.length}
+        for name in ("length", *largest, "corridor", "turn_radius"):
             value = getattr(self, name)
             if value is not None or name in ("dt", "length", "rudder_limit"):
-                check_number(value, name, above=0.0, at_most=largest.get(name))
+                most = largest.get(name)
+                self._set(name, check_number(value, name, above=0.0, at_most=most))
         self._set_series()
         if self.waypoints is not None:
             path = PlannedPath(self.waypoints)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from os.path import exists
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -171,7 +172,8 @@ def load_model(name: str | Path) -> ShipModel:
     if path.suffix == ".py":
         return model_of(register_ship_equations(path))
     models = list_models()
-    if name not in models and (isinstance(name, Path) or _is_file(path)):
+    is_path = isinstance(name, Path) or path.suffix == ".json" or exists(path)
+    if name not in models and is_path:
         return ShipModel.load(path)
     known = check_choice(name, models, "model (a name, or the path of a model file)")
     if known in REFERENCE_SHIPS:
@@ -179,14 +181,6 @@ def load_model(name: str | Path) -> ShipModel:
     if known in REGISTERED_EQUATIONS:
         return model_of(REGISTERED_EQUATIONS[known])
     return ShipModel.load(LIBRARY / f"{known}.json")
-
-
-def _is_file(path: Path) -> bool:
-    """True for the path of a file that exists, or is meant as that of a model file."""
-    try:
-        return path.suffix == ".json" or path.exists()
-    except OSError:  # a text too long for a path
-        return False
 
 
 # ---- grey boxes ----------------------------------------------------------------------

@@ -58,6 +58,7 @@ def read_times(table: LogTable, column: Column) -> RowTimes:
         if column.unit.endswith("days"):
             clock = np.round(clock, 3)  # days have some nine decimals
         clock += _EPOCHS.get(column.unit, 0.0)
+        clock[np.isinf(clock)] = np.nan
     clock = _one_after_another(_spread(clock, notes), notes)
     if is_numeric and column.unit not in _EPOCHS:
         return RowTimes(clock, column.unit, start=None, notes=notes)
@@ -142,7 +143,7 @@ def _one_after_another(clock: Floats, notes: list[str]) -> Floats:
     back = clock[starts - 1] - clock[starts]
     rows = np.diff(starts, prepend=0, append=clock.size)
     is_hour = (back > 1700.0) & (back < 3700.0)
-    is_clock = is_hour | (back < 10.0) | np.isinf(back)
+    is_clock = is_hour | (back < 10.0)
     if not starts.size or is_clock.any() or rows.min() < 20:
         return clock
     notes.append(

@@ -94,8 +94,9 @@ def split_unit(
     text = text.rstrip("]) ")
     bare = text
     units: list[str] = []
-    for start, before in enumerate(f" {text[:-1]}"):
-        if before not in "[( ":
+    longest = 80
+    for start in range(max(0, len(text) - longest), len(text)):
+        if f" {text}"[start] not in "[( ":
             continue
         spelled = spelled_units(text[start:])
         if spelled and not units:

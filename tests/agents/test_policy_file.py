@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from safetensors.numpy import load_file, save_file
 
-from agents import PID, load_agent
+from agents import PID, load_agent, load_results
+from shipgym import load_model
 from shipgym.errors import InputError
 from shipgym.sea import Current, Weather
 from tests.agents.policies import MARINER, random_policy
@@ -194,3 +195,17 @@ def test_a_file_cut_short_or_missing_is_refused(end, saved):
     cut.unlink()
     with pytest.raises(InputError, match=f"agent.{end}: there is no such"):
         load_agent(saved)
+
+
+def test_weights_in_another_form_are_refused(saved):
+    file = saved.with_suffix(".safetensors")
+    file.write_bytes(b"\xff" * 100)
+    edited(saved, "weights__sha256", hashlib.sha256(file.read_bytes()).hexdigest())
+    with pytest.raises(InputError, match=r"agent.safetensors: expected a safetensors"):
+        load_agent(saved)
+
+
+def test_a_name_too_long_for_a_path_is_refused():
+    for read in (load_agent, load_results, load_model):
+        with pytest.raises(InputError, match="expected"):
+            read("x" * 5000 + ".py" * (read is load_model))

@@ -8,6 +8,7 @@ from itertools import islice
 from statistics import mode
 from typing import NamedTuple
 
+from shipgym.checks import shown
 from shipgym.errors import InputError
 from shipgym.trials.readers.cell_texts import is_missing, is_number
 from shipgym.trials.units import split_unit
@@ -122,9 +123,9 @@ def check_names(where: str, names: Sequence[str]) -> None:
             " above"
         )
     for name, count in Counter(names).items():
-        if not name.isprintable():
+        if not name.isprintable() or len(name) > most:
             raise InputError(
-                f"{where}: expected column names, got {name!r}; save the table as"
+                f"{where}: expected column names, got {shown(name)}; save the table as"
                 " comma-separated text in UTF-8"
             )
         if name and count > 1:
