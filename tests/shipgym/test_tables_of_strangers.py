@@ -111,6 +111,7 @@ READ = {
     "to port": (rudder(lambda x: f"{-x:.2f}"), {}, "side port"),
     "ns": (number(lambda k: f"{EPOCH + k}000000000"), {}, "t: in unix ns"),
     "ms": (number(lambda k: f"{1000 * k}"), {}, "t: in ms"),
+    "elapsed": (number(str), {"names": ["Elapsed", *NAMES[1:]]}, "'Elapsed' in s"),
     "days": (
         number(lambda k: f"{44319.416551 + k / 86400:.9f}"),
         {},
