@@ -194,6 +194,8 @@ def test_a_steering_command_stands_for_the_rudder(tmp_path, names, edit):
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "(.xls); save it as .xlsx"),
         (b"<!DOCTYPE html>", "a web page, a PDF or a ship file; name a log"),
         (b"%PDF-1.7\n\xe2", "a web page, a PDF or a ship file; name a log"),
+        (b"# A\n\n| a | b |\n| - | - |\n| c | d |\n", "a text without a table of"),
+        (b'{\n "u": {"nrmse": 0.1}\n}\n', "a JSON file without messages; give a model"),
         (b"# by new-ship\n\n[ship]\n", "a web page, a PDF or a ship file; name a log"),
     ],
 )

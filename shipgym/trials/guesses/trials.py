@@ -204,6 +204,7 @@ def _guess_tables(guess: TrialGuess) -> None:
     columns: dict[str, ColumnGuess] = {}
     tables = sorted(guess.tables, key=lambda table: len(table.rows), reverse=True)
     for table in tables:
+        _check_numbers(table)
         found = {one.channel: one for one in guess_columns(table)}
         guess.decisions += _unknown_units(found)
         for channel, one in settle_speeds(table, found).items():
@@ -212,6 +213,16 @@ def _guess_tables(guess: TrialGuess) -> None:
             columns.setdefault(channel, one)
     guess.columns = list(columns.values())
     _ask_for_missing(guess)
+
+
+def _check_numbers(table: LogTable) -> None:
+    """Refuse a text in which no column holds numbers."""
+    columns = map(table.likely_numbers, table.header)
+    if not any(one is not None and np.isfinite(one).any() for one in columns):
+        raise InputError(
+            f"{table.path}: expected a log, got a text without a table of numbers; name"
+            " a log, its columns named in one line and numbers below"
+        )
 
 
 def _ask_for_missing(guess: TrialGuess) -> None:
