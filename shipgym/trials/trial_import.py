@@ -15,7 +15,7 @@ from shipgym.trials.plausibility.agreement import (
     check_velocity,
     check_yaw_rate,
 )
-from shipgym.trials.plausibility.over_ground import check_over_ground
+from shipgym.trials.plausibility.over_ground import check_over_ground, check_speed_units
 from shipgym.trials.plausibility.values import frozen_heading
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.recording import Recording, read_recording
@@ -164,6 +164,9 @@ def _check_channels(
     has_positions = any("lat" in one.locator.columns for one in recordings)
     if has_positions or log.has("ground_north"):
         remarks += check_over_ground(log, conventions, locator)
+    if log.has("x", "y") or log.has("ground_north"):
+        for one in recordings:
+            check_speed_units(log, one.locator)
     if log.has("psi", "r"):
         check_yaw_rate(log, locator)
     if log.has("x", "y", "psi", "u", "v"):

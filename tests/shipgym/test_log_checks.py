@@ -57,6 +57,16 @@ def at(values, row, value):
             "a position that changes 1.95 times as fast as the velocities say; likely",
         ),
         (
+            {"psi": TURN, "x": X, "y": Y, "stw": U / 0.514},
+            "0.514 times as much over ground, which no current does; likely a wrong"
+            ' unit, declare stw = { column = "stw", unit = "knots" }',
+        ),
+        ({"psi": TURN, "x": X, "y": Y, "u": 3.6 * U}, 'unit = "km/h" }'),
+        (
+            {"psi": TURN, "sog": U, "cog": TURN + 0.2 * SWING, "stw": 2.0 * U},
+            '"knots" }',
+        ),
+        (
             {"psi": TURN, "x": X, "y": Y, "u": 5 * np.cos(TURN), "v": 5 * np.sin(TURN)},
             'got velocities in the earth frame; declare velocity_frame = "earth"',
         ),

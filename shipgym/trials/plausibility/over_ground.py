@@ -10,8 +10,10 @@ from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.resampling import Log
-from shipgym.trials.units import DEGREE
+from shipgym.trials.resampling import Log, usual_step
+from shipgym.trials.units import DEGREE, UNITS
+
+_SLOWEST = 0.3  # m/s over ground, of any manoeuvre
 
 
 def _velocity_over_ground(log: Log) -> npt.NDArray[np.complex128]:
@@ -34,8 +36,7 @@ def check_over_ground(
     velocity = _velocity_over_ground(log)
     speed = np.abs(velocity)
     fastest = np.quantile(speed, 0.95)
-    slowest = 0.3  # m/s, of any manoeuvre
-    if fastest < slowest:
+    if fastest < _SLOWEST:
         raise InputError(
             f"{locator.path}: expected a manoeuvre, got a ship that makes at most"
             f" {fastest:.2g} m/s over ground: she is at berth or at anchor; read"
@@ -64,6 +65,49 @@ def check_over_ground(
         "the heading is magnetic by its name; write what it shows too much as"
         " heading_offset_deg"
     ]
+
+
+def check_speed_units(log: Log, locator: Locator) -> None:
+    """Refuse a speed that is to the one over ground as one unit is to another.
+
+    No current changes the speed of a ship by so much. The channels are in SI units.
+    """
+    channels = log.channels
+    known = {"stw": channels.get("stw")}
+    if "x" in channels and "ground_north" in channels:
+        known["sog"] = np.hypot(channels["ground_north"], channels["ground_east"])
+    if "v" not in channels:
+        known["u"] = channels.get("u")
+    over_ground = _usual_speed(log)
+    for channel, values in known.items():
+        if values is None or channel not in locator.columns:
+            continue
+        ratio = over_ground / max(float(np.median(np.abs(values))), 1e-9)
+        if over_ground < _SLOWEST or 0.6 < ratio < 1.67:
+            continue
+        column = locator.columns[channel]
+        factors = UNITS["speed"]
+        sought = ratio * factors[column.unit]
+        unit = min(factors, key=lambda one: abs(math.log(factors[one] / sought)))
+        if not 0.85 < factors[unit] / sought < 1.18:
+            continue
+        raise InputError(
+            f"{locator.path}: expected column '{column.name}' to agree with the speed"
+            f" over ground, got {ratio:.3g} times as much over ground, which no current"
+            f" does; likely a wrong unit, declare {locator.declaration(channel, unit)}",
+            [(channel, unit)],
+        )
+
+
+def _usual_speed(log: Log) -> float:
+    """Median speed over ground, m/s, by positions some seconds apart if there are."""
+    if "x" not in log.channels:
+        return float(np.median(np.abs(_velocity_over_ground(log))))
+    rows = min(math.ceil(5.0 / usual_step(log.t)), log.t.size - 1)
+    t, x, y = (
+        one[rows:] - one[:-rows] for one in (log.t, *(log.channels[k] for k in "xy"))
+    )
+    return float(np.median(np.hypot(x, y) / t))
 
 
 def _mirrored(
