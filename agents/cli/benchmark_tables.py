@@ -28,6 +28,7 @@ def ranking_tables(result: BenchmarkResult) -> Iterator[Table]:
             "controller",
             ">score",
             ">95 %",
+            ">mean cost",
             ">tasks",
             ">lost",
             ">failed",
@@ -38,6 +39,7 @@ def ranking_tables(result: BenchmarkResult) -> Iterator[Table]:
             table.add_row(
                 one["name"],
                 *_interval(one["scores"].get("ship"), 3),
+                number(one["mean_cost"], 2),
                 f"{one['tasks']} of {one['of']}",
                 str(one["lost"]),
                 Text(str(failed), "bold red") if failed else "0",

@@ -30,7 +30,7 @@ def identify_options(
     ] = None,
     reference_model: Annotated[
         str | None,
-        Option(help="Reference ship of a grey box or of mmg: auto, a name or a file."),
+        Option(help="Reference ship of a grey box: auto, a name or a file."),
     ] = None,
     set_: Settings = None,
 ) -> dict[str, Any]:

@@ -163,6 +163,11 @@ def _print_result(result: TrainingResult, out: Path) -> None:
     for name, cost in costs.items():
         table.add_row(name, f"{cost:.6g}")
     console.print(table)
+    if best["cost"] >= min(first["cost"], *result.yardsticks.values()):
+        say(
+            "nothing better was learned than what was there: train for more steps, or"
+            " see shipgym train --help for rewards and settings"
+        )
     say(f"written: {agent}")
 
 

@@ -152,8 +152,8 @@ def _out_of_range(ship: Particulars) -> tuple[str, ...]:
     ]
     return tuple(
         f"{name} {value:.3g} is outside the range of the regression formulas, {low:g}"
-        f" to {high:g}: their coefficients are doubtful; name a reference_model like"
-        " this ship"
+        f" to {high:g}: their coefficients are doubtful; name as prior a ship in the"
+        " MMG form that is like this one"
         for name, value, low, high in ratios
         if not low <= value <= high
     )

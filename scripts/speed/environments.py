@@ -194,12 +194,12 @@ def kernel_ship(n_envs: int = 1024, centres: int = 64) -> Row:
 
 
 def learning(task: str) -> Row:
-    """Frames per second of PPO as shipped, on two cores, and our share of the time."""
+    """Frames per second of PPO as shipped, on one core, and our share of the time."""
     from speed.learning import ppo_speed  # here, because torch takes seconds to import
 
     frames, share = ppo_speed(env_id(task))
     return Row(
-        f"PPO, 256 {task}, two cores",
+        f"PPO, 256 {task}, one core",
         f"{frames / 1e3:.1f} k frames/s",
         f"{100.0 * share:.1f} % of the time in the environment",
         None,

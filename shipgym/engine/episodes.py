@@ -72,7 +72,7 @@ def run(memory: Any, output_memory: Any, share: int, asked: int) -> int:
         In which the engine's arrays lie, and those that users are given
         (`shipgym.engine.memory`).
     share : int
-        Number of the share, whose thread this is.
+        Number of the share.
     asked : int
         `STEP`; `STEP_AND_BEGIN`, in which lanes whose episode was over do not stay as
         they are, but begin the next one; `BEGIN` or `BEGIN_NEXT` in the chosen lanes.
