@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from agents.controllers.controller import Controller
 from agents.controllers.controller_file import LEARNED, REMEDY, read_controller
-from shipgym import InputError, ShipModel
+from shipgym import InputError, ShipModel, load_model
 from shipgym.checks import did_you_mean
 from shipgym.files import expecting, read_json
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 PRETRAINED = Path(__file__).parent / "pretrained"
 
 
-def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
+def load_agent(path: str | Path, model: ShipModel | str | Path | None = None) -> Agent:
     """Read the file of a controller or of a learned policy; neither needs torch.
 
     Parameters
@@ -28,8 +28,8 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
     path : str or Path
         A file, or the name of a pretrained agent, `path-following-ppo`
         (`list_pretrained`).
-    model : ShipModel, optional
-        The ship to steer; one with other observation scales is refused.
+    model : ShipModel, str or Path, optional
+        The ship to steer, or its name or file; one with other observation scales is refused.
 
     Returns
     -------
@@ -58,7 +58,8 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
             agent = read_controller(content, str(path))
 
     if model is not None:
-        agent.check_fits_model(model)
+        ship = model if isinstance(model, ShipModel) else load_model(model)
+        agent.check_fits_model(ship)
     return agent
 
 
