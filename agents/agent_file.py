@@ -29,7 +29,8 @@ def load_agent(path: str | Path, model: ShipModel | str | Path | None = None) ->
         A file, or the name of a pretrained agent, `path-following-ppo`
         (`list_pretrained`).
     model : ShipModel, str or Path, optional
-        The ship to steer, or its name or file; one with other observation scales is refused.
+        The ship to steer, or its name or file; one with other observation scales is
+        refused.
 
     Returns
     -------
