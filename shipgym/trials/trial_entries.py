@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shipgym.checks import check_choice, check_table, check_text, placed
+from shipgym.checks import check_choice, check_table, check_text, placed, shown
 from shipgym.errors import InputError
 from shipgym.files import check_readable
 from shipgym.ships.particulars import Particulars
@@ -65,7 +65,7 @@ def read_entries(
     if not isinstance(tables, list) or not tables:
         raise InputError(
             f"{path}: trials: expected tables that begin with [[trials]], at least one"
-            f' with file = "run.csv", got {"none" if not tables else "a single value"}'
+            f' with file = "run.csv", got {shown(tables)}'
         )
     columns = parse_columns(data.get("columns", {}), f"{path}: [columns]")
     sensors = check_table(data.get("sensors", {}), f"{path}: [sensors]")

@@ -16,7 +16,7 @@ from shipgym.trials.plausibility.agreement import (
     check_yaw_rate,
 )
 from shipgym.trials.plausibility.over_ground import check_over_ground, check_speed_units
-from shipgym.trials.plausibility.values import frozen_heading
+from shipgym.trials.plausibility.values import check_rudder_unit, frozen_heading
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.recording import Recording, read_recording
 from shipgym.trials.resampling import Log, Signal, Signals, on_one_clock
@@ -167,6 +167,9 @@ def _check_channels(
     if log.has("x", "y") or log.has("ground_north"):
         for one in recordings:
             check_speed_units(log, one.locator)
+    if log.has("psi") or log.has("r"):
+        for one in recordings:
+            check_rudder_unit(log, one.locator)
     if log.has("psi", "r"):
         check_yaw_rate(log, locator)
     if log.has("x", "y", "psi", "u", "v"):

@@ -172,6 +172,17 @@ def test_a_rudder_of_the_other_sign_is_refused(tmp_path):
     np.testing.assert_allclose(trial["delta"], zigzag["delta"])
 
 
+@pytest.mark.parametrize("turning", ["psi", "r"])
+def test_a_rudder_in_radians_that_is_declared_in_degrees_is_refused(tmp_path, turning):
+    zigzag = record(step=0.5)
+    columns = {name: zigzag[name] for name in ("t", turning, "delta")}
+    path = written(tmp_path / "run.csv", **columns)
+    named = {turning: turning, "delta": {"column": "delta", "unit": "deg"}}
+    message = refusal(path, columns=named)
+    assert "got at most 0.35 deg; likely a wrong unit" in message
+    assert 'declare delta = { column = "delta", unit = "rad" }' in message
+
+
 # --- parts of a log
 
 

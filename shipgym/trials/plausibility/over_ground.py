@@ -72,24 +72,15 @@ def check_speed_units(log: Log, locator: Locator) -> None:
 
     No current changes the speed of a ship by so much. The channels are in SI units.
     """
-    channels = log.channels
-    known = {"stw": channels.get("stw")}
-    if "x" in channels and "ground_north" in channels:
-        known["sog"] = np.hypot(channels["ground_north"], channels["ground_east"])
-    if "v" not in channels:
-        known["u"] = channels.get("u")
     over_ground = _usual_speed(log)
-    for channel, values in known.items():
-        if values is None or channel not in locator.columns:
-            continue
-        ratio = over_ground / max(float(np.median(np.abs(values))), 1e-9)
-        if over_ground < _SLOWEST or 0.6 < ratio < 1.67:
-            continue
+    if over_ground < _SLOWEST:
+        return
+    speeds = _speeds(log)
+    for channel in speeds.keys() & locator.columns.keys():
+        ratio = over_ground / max(speeds[channel], 1e-9)
         column = locator.columns[channel]
-        factors = UNITS["speed"]
-        sought = ratio * factors[column.unit]
-        unit = min(factors, key=lambda one: abs(math.log(factors[one] / sought)))
-        if not 0.85 < factors[unit] / sought < 1.18:
+        unit = _unit_instead(ratio, column.unit)
+        if not unit:
             continue
         raise InputError(
             f"{locator.path}: expected column '{column.name}' to agree with the speed"
@@ -99,15 +90,36 @@ def check_speed_units(log: Log, locator: Locator) -> None:
         )
 
 
+def _speeds(log: Log) -> dict[str, float]:
+    """Median size of the speeds to compare with that over ground, m/s."""
+    channels = log.channels
+    speeds = {"stw": channels["stw"]} if log.has("stw") else {}
+    if log.has("x", "ground_north"):
+        speeds["sog"] = np.hypot(channels["ground_north"], channels["ground_east"])
+    if log.has("u") and not log.has("v"):
+        speeds["u"] = channels["u"]
+    return {name: float(np.median(np.abs(one))) for name, one in speeds.items()}
+
+
+def _unit_instead(ratio: float, declared: str) -> str:
+    """Unit of a speed that is wrong by a ratio; empty where none fits."""
+    if 0.6 < ratio < 1.67:
+        return ""
+    factors = UNITS["speed"]
+    sought = ratio * factors[declared]
+    apart = {unit: abs(math.log(one / sought)) for unit, one in factors.items()}
+    nearest = min(apart, key=lambda unit: apart[unit])
+    return nearest if apart[nearest] < 0.16 else ""
+
+
 def _usual_speed(log: Log) -> float:
     """Median speed over ground, m/s, by positions some seconds apart if there are."""
-    if "x" not in log.channels:
+    if not log.has("x"):
         return float(np.median(np.abs(_velocity_over_ground(log))))
     rows = min(math.ceil(5.0 / usual_step(log.t)), log.t.size - 1)
-    t, x, y = (
-        one[rows:] - one[:-rows] for one in (log.t, *(log.channels[k] for k in "xy"))
-    )
-    return float(np.median(np.hypot(x, y) / t))
+    signals = (log.t, log.channels["x"], log.channels["y"])
+    passed, *moved = (one[rows:] - one[:-rows] for one in signals)
+    return float(np.median(np.hypot(*moved) / passed))
 
 
 def _mirrored(

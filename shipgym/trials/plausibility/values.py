@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from shipgym.arrays import Flags, Floats
+from shipgym.arrays import Flags, Floats, integral
 from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
 from shipgym.trials.resampling import Log, usual_step
@@ -18,6 +18,7 @@ from shipgym.trials.units import (
 )
 
 _LARGEST_JUMP = 30.0 * DEGREE  # of a heading's single outlier that passes
+_RUDDERS = {"delta", "delta_command"}
 _TURN_AND_JUMP = 2.0 * math.pi + _LARGEST_JUMP
 
 
@@ -139,6 +140,42 @@ def find_outliers(t: Floats, x: Floats, y: Floats, locator: Locator) -> Flags:
     # the first and the last one have a neighbour on one side only
     is_outlier: Flags = np.append(True, too_fast) & np.append(too_fast, True)
     return is_outlier
+
+
+def check_rudder_unit(log: Log, locator: Locator) -> None:
+    """Refuse a rudder in degrees that is too small for the turns of the log.
+
+    The channels are in SI units, the heading without jumps.
+    """
+    turned_deg, fastest = _turning(log)
+    for channel in locator.columns.keys() & log.channels.keys() & _RUDDERS:
+        column = locator.columns[channel]
+        largest = np.abs(log.channels[channel]).max()
+        largest_deg = largest / DEGREE
+        is_small = column.unit == "deg" and 0.05 < largest_deg < 1.0
+        # in a second no ship turns by half her rudder
+        is_turn = turned_deg > 20.0 and fastest > 0.5 * largest
+        if not is_small or not is_turn or column.full is not None:
+            continue
+        raise InputError(
+            f"{locator.path}: expected column '{column.name}' to move by more than 1"
+            f" deg in a turn of {turned_deg:.0f} deg, got at most"
+            f" {largest_deg:.2g} deg; likely a wrong unit, declare"
+            f" {locator.declaration(channel, 'rad')}",
+            [(channel, "rad")],
+        )
+
+
+def _turning(log: Log) -> tuple[float, float]:
+    """Range of the heading, deg, and how fast it turns over some seconds, rad/s."""
+    psi = log.channels.get("psi")
+    if psi is None:
+        psi = integral(log.t, log.channels["r"])
+    rows = min(math.ceil(5.0 / usual_step(log.t)), psi.size - 1)
+    turned = psi[rows:] - psi[:-rows]
+    passed = log.t[rows:] - log.t[:-rows]
+    rates = np.abs(turned) / passed
+    return math.degrees(np.ptp(psi)), float(np.quantile(rates, 0.95))
 
 
 def frozen_heading(log: Log) -> list[str]:
