@@ -238,8 +238,9 @@ def run(
         Path | None, typer.Argument(help="Keeps all files; by default none are.")
     ] = None,
 ) -> None:
-    """Run the tutorial in a folder."""
+    """Run the tutorial in a folder; docs/tutorial.md and its pictures are rewritten."""
     if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
         main(folder.resolve())
         return
     with tempfile.TemporaryDirectory() as made:

@@ -107,7 +107,7 @@ class LearnedPolicy:
         learning curve, score.
     """
 
-    network: Network
+    network: Network = field(repr=False)
     observation_names: tuple[str, ...]
     observation_scales: tuple[float, ...]
     action: str = "rudder"
@@ -120,7 +120,7 @@ class LearnedPolicy:
     env_options: Mapping[str, Any] = field(default_factory=dict)
     model_name: str = "unknown"
     model_sha256: str = "unknown"
-    training: Mapping[str, Any] = field(default_factory=dict)
+    training: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         check_choice(self.action, ACTIONS, "action")

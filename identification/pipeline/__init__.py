@@ -7,6 +7,7 @@ from typing import Any
 from identification.estimators.threads import single_threaded
 from identification.pipeline.by_regression import by_regression
 from identification.pipeline.options import AUTO, Options
+from identification.pipeline.reading import identify_arguments, read_table
 from identification.pipeline.result import IdentificationResult, with_provenance
 from identification.progress import announce
 from identification.samples.problem import held_out
@@ -22,7 +23,8 @@ def identify(
     """Identify a manoeuvring model from recorded trials.
 
     The other arguments are those of `Options`, which documents them: structure, method,
-    samples, particulars and steering, also by their place, and others by name.
+    samples, particulars and steering, also by their place, and others by name; settings
+    of a method or a stage by name too, such as ``objective="k-fold"``.
 
     Parameters
     ----------
@@ -42,7 +44,7 @@ def identify(
         For trials that excite nothing, lack channels or samples, and for particulars
         that do not suffice.
     """
-    asked = Options(*arguments, **options)
+    asked = Options(*arguments, **_read(options))
     marked, sea = in_still_water(
         held_out(trials, asked.hold_out),
         asked.particulars,
@@ -57,6 +59,15 @@ def identify(
         announce(f"identifying {len(marked)} trials, some seconds")
         result = identified(marked, asked)
     return with_provenance(result, sea)
+
+
+def _read(options: dict[str, Any]) -> dict[str, Any]:
+    """Arguments of `Options`; settings of stages may be named as in a ship file."""
+    if options.keys() <= inspect.signature(Options).parameters.keys():
+        return options
+    ship = {"particulars", "steering"} & options.keys()
+    about_ship = {name: options.pop(name) for name in ship}
+    return about_ship | identify_arguments(read_table(options, "identify"))
 
 
 _TRIALS = inspect.signature(identify).parameters["trials"]

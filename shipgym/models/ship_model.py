@@ -156,6 +156,13 @@ class ShipModel(ManoeuvringModel):
         references = ship.sample(n, rng)
         return [replace(box, reference=drawn) for drawn in references]
 
+    def __repr__(self) -> str:
+        """Return the name, the structure and how much is known."""
+        known = f"{len(self.coefficients)} coefficients"
+        if self.covariance is not None:
+            known += " with their covariance"
+        return f"<ShipModel {self.name}: {self.structure}, {known}>"
+
     def save(self, path: str | Path) -> None:
         """Write the model as a JSON file (format in `shipgym.models.model_file`)."""
         write_json(self.to_dict(), Path(path))

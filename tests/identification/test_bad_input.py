@@ -33,6 +33,14 @@ def refusal(mariner: ShipModel) -> Callable[..., str]:
     return message
 
 
+def test_an_unknown_option_is_named_with_the_nearest(
+    cao_zigzag: Trial, refusal: Callable[..., str]
+) -> None:
+    assert "Did you mean 'structure'" in refusal(cao_zigzag, strcture="abkowitz")
+    told = refusal(cao_zigzag, method="abc-lssvr", objective="best")
+    assert told.startswith("objective: expected one of")
+
+
 def test_a_rudder_that_never_moves_excites_nothing(
     cao_zigzag: Trial, refusal: Callable[..., str]
 ) -> None:
