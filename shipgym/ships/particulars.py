@@ -400,7 +400,8 @@ def check_together(values: Mapping[str, float]) -> None:
         if share is None:
             continue
         is_area = limits["is_area"]
-        largest = share * length * (length if is_area else 1.0)
+        reference = length * length if is_area else length
+        largest = share * reference
         if abs(value) > largest:
             squared = " squared" if is_area else ""
             unit = "m2" if is_area else "m"

@@ -192,9 +192,11 @@ def other_ship(
     least = LEAST_START * ship.length
     further = max(1.0, least / max(away, 1.0))
 
+    ahead = further * north
+    aside = further * east
     place = Place(
-        x=own.x + further * north,
-        y=own.y + further * east,
+        x=own.x + ahead,
+        y=own.y + aside,
         psi=meeting.course,
         r=0.0,
     )
