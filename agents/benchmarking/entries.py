@@ -333,12 +333,15 @@ def _module(text: str) -> ModuleType:
         return load_file(Path(module))
     try:
         with working_folder():
-            return import_module(module)
-    except ImportError as error:
+            found = import_module(module)
+    except Exception as error:  # a user's own module may raise anything
         raise InputError(
             f"controllers: expected module:function, got '{text}', which cannot be"
             f" imported ({error})"
         ) from None
+    if getattr(found, "__file__", None) is None:
+        raise InputError(f"controllers: expected a module with a file, got '{module}'")
+    return found
 
 
 def source_files(text: str, task: BenchmarkTask) -> list[Path]:

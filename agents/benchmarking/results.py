@@ -25,7 +25,7 @@ from agents.controllers.interface import model_hash
 from agents.output import check_writable, present
 from agents.suites.suite import BenchmarkTask, Suite
 from shipgym.arrays import Floats
-from shipgym.checks import check_format, check_keys
+from shipgym.checks import check_choice, check_format, check_keys
 from shipgym.drafts import atomic_path
 from shipgym.errors import InputError
 from shipgym.extras import axes_of, library
@@ -108,6 +108,10 @@ class BenchmarkResult:
 
         There are no runs where the controller could not run the task.
         """
+        check_choice(controller, self.summary["controllers"], "controller")
+        check_choice(task, self.tasks, "task")
+        check_choice(name, list(self.episodes.columns), "figure")
+        check_choice(on, set(self.episodes["set"]), "set")
         rows = self.episodes.query("controller == @controller and task == @task")
         figures: Floats = rows.loc[rows["set"] == on, name].to_numpy(np.float64)
         return figures.reshape(-1, self.summary["options"]["episodes"])

@@ -41,8 +41,8 @@ def export_command(
     """Write an autopilot or a ship model as C99 or FMU, a learned policy as ONNX."""
     from agents.agent_file import load_agent
     from agents.cli.terminal import answer, say, warn
-    from agents.export.fmu import write_fmu
-    from agents.output import whole_folder
+    from agents.export.fmu import check_fmu_name, write_fmu
+    from agents.output import check_file, check_folder, whole_folder
     from agents.policies.onnx_export import onnx_model
     from shipgym.errors import InputError
     from shipgym.files import write_bytes
@@ -60,6 +60,14 @@ def export_command(
     source = _source(what, name, depth) if has_source else None
     for note in source.notes if source else ():
         warn(note)
+    # all are checked before the first is written
+    if fmu is not None:
+        check_fmu_name(fmu)
+    for file in (fmu, onnx):
+        if file is not None:
+            check_file(file)
+    if c is not None and source is not None:
+        check_folder(c, (f"{source.name}.h", f"{source.name}.c"))
     if source is not None and fmu is not None:
         write_fmu(source, fmu)
     if graph is not None and onnx is not None:

@@ -3,6 +3,7 @@
 It checks what rollouts, the benchmark and the tools of stable-baselines3 rely on.
 """
 
+import inspect
 from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
@@ -55,8 +56,18 @@ def check_controller(
     ship = ship_of("mariner" if model is None else model)
     asked = task or course_keeping_task()
     name = type(controller).__name__
-    if not callable(getattr(controller, "predict", None)):
+    predict = getattr(controller, "predict", None)
+    if not callable(predict):
         raise InputError(f"{name}: expected a method predict, got none")
+    signature = inspect.signature(predict)
+    try:
+        signature.bind(None, state=None, episode_start=None, deterministic=True)
+        signature.bind(None, None, None, True)
+    except TypeError as error:
+        raise InputError(
+            f"{name}.predict: expected predict(observation, state=None,"
+            f" episode_start=None, deterministic=True), got {signature}: {error}"
+        ) from None
     check_observations(controller, ship, asked, name)
 
     method = f"{name}.predict"

@@ -307,7 +307,7 @@ class Controller:
         told = np.array(state)
         order = action[..., 0] * self.rudder_limit
         told[..., names.index("given")] = order - self.neutral_rudder
-        return told
+        return np.where(np.isfinite(told), told, state)
 
     def _memory_of(self, state: Any, episode_start: Any, shape: tuple[int, ...]) -> Any:
         """Record of what is remembered of ships of a shape, from a state."""

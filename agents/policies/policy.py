@@ -281,6 +281,11 @@ class LearnedPolicy:
         )
         if state is None:
             return fresh
+        if not isinstance(state, PolicyMemory):
+            raise InputError(
+                "state: expected what the last predict returned, or None where episodes"
+                f" begin, got {type(state).__name__}"
+            )
         checked_memory(state.seen, fresh.seen.shape)
         begins = checked_starts(starts, (n,))[:, None]
         return PolicyMemory(

@@ -53,6 +53,13 @@ class TrainingPlan:
 
     def __post_init__(self) -> None:
         check_whole(self.seed, "seed", at_least=0, at_most=799)
+        check_whole(
+            self.settings.action_repeat,
+            "action_repeat",
+            at_least=1,
+            at_most=self.task.task.episode_steps,
+            hint="no longer than an episode",
+        )
         self.task.task.check_fits(self.task.ship)
         action = check_choice(self.task.task.action, OUTPUTS, "action")
         if action == "rudder-discrete" and self.algorithm != "ppo":

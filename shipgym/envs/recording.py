@@ -63,6 +63,7 @@ class RecordEpisode(
         self.episode_number = -1
         self._folder = _folder(Path(folder), overwrite)
         self._since_seed = -1
+        self._is_recording = False
         self._actions: list[Floats] = []
         self._rewards: list[float] = []
 
@@ -80,6 +81,7 @@ class RecordEpisode(
         self._ends = (False, False)
         self._actions, self._rewards = [], []
         self._states, self._infos = [self._ship.physical_state()], [info]
+        self._is_recording = True
         return observation, info
 
     def step(
@@ -87,6 +89,8 @@ class RecordEpisode(
     ) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
         """Take one step; the one that ends an episode writes its files."""
         observation, reward, terminated, truncated, info = super().step(action)
+        if not self._is_recording:  # after a reset that was refused
+            return observation, reward, terminated, truncated, info
         self._actions.append(np.array(action, dtype=float).reshape(-1))
         self._rewards.append(float(reward))
         self._states.append(self._ship.physical_state())
@@ -108,6 +112,7 @@ class RecordEpisode(
             path = self._folder / name
             self._episode().save(path)
         self._rewards = []
+        self._is_recording = False
 
     def _episode(self) -> Episode:
         """Make the episode."""

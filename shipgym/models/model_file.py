@@ -185,7 +185,10 @@ def _read_draws(
         return None
     if fields.get("covariance") is None:
         raise unexpected(where, "none without their covariance", rows)
-    return check_array(rows, (None, len(names)), where)
+    draws = check_array(rows, (None, len(names)), where)
+    if len(draws) < 2:
+        raise unexpected(where, "two rows at least", rows)
+    return draws
 
 
 def _read_covariance(value: Any, n: int, where: str) -> Floats:

@@ -123,15 +123,21 @@ class ManoeuvringModel:
         structure cannot use.
         """
         self.check_depth(water_depth)
-        return np.concatenate([ship_of(self, water_depth, step), self._numbers])
+        values = tuple(self.coefficients.values())
+        if values not in self._numbers:
+            self._numbers.clear()
+            self._numbers[values] = self.dynamics.numbers(
+                self.coefficients,
+                self.particulars,
+                self.service_shaft_speed,
+            )
+        ship = ship_of(self, water_depth, step)
+        return np.concatenate([ship, self._numbers[values]])
 
     @cached_property
-    def _numbers(self) -> Floats:
-        return self.dynamics.numbers(
-            self.coefficients,
-            self.particulars,
-            self.service_shaft_speed,
-        )
+    def _numbers(self) -> dict[tuple[float, ...], Floats]:
+        """Last numbers of the dynamics, by the coefficients they were computed from."""
+        return {}
 
     @property
     def state_names(self) -> tuple[str, ...]:

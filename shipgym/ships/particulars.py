@@ -16,6 +16,7 @@ from shipgym.checks import (
     check_table,
     check_text,
     placed,
+    quoted,
     unexpected,
 )
 from shipgym.constants import SEA_WATER
@@ -183,6 +184,12 @@ class Particulars(Mapping[str, Any]):
                 " none"
             )
         estimated: Any = table.pop("estimated", None) or ()
+        twice = table.keys() & added.keys()
+        if twice:
+            raise InputError(
+                f"{where} added_mass: expected each value in one place, got"
+                f" {quoted(sorted(twice))} twice"
+            )
         with placed(where, " "):
             return cls(**(table | added), estimated=estimated)
 

@@ -92,3 +92,13 @@ def test_a_base_knows_the_rudder_by_the_orders_that_were_given():
         order, state = LQ_MARINER.predict(shown, state)
     assert order == pytest.approx(expected)
     assert order != pytest.approx(LQ_MARINER.predict(0.0 * shown)[0])
+
+
+def test_one_observation_that_is_no_number_does_not_stay():
+    agent = load_agent("path-following-ppo")
+    seen = np.zeros((3, len(agent.observation_names)), dtype=np.float32)
+    seen[1, 0] = np.nan
+    state = None
+    for row in seen:
+        action, state = agent.predict(row, state)
+    assert np.isfinite(action).all()

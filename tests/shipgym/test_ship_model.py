@@ -222,3 +222,11 @@ def test_states_and_commands_that_are_none_are_refused():
         tanker.derivatives(tanker.service_state, tanker.service_command, 18.0)
     many = mariner.derivatives(np.tile(state, (2, 3, 1)), np.zeros((3, 1)))
     assert many.shape == (2, 3, 7)
+
+
+def test_a_coefficient_that_is_changed_counts():
+    model = shipgym.load_model("mariner")
+    orders = np.full((50, 1), 0.2)
+    before = model.simulate(orders, dt=1.0)["r"][-1]
+    model.coefficients["N_r"] *= 2.0
+    assert model.simulate(orders, dt=1.0)["r"][-1] != pytest.approx(before)
