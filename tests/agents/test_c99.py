@@ -387,7 +387,7 @@ def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
             tmp_path / "no.onnx",
         ),
         (
-            "choose a folder that exists",
+            "its folder does not exist or cannot be written",
             "mariner",
             "--c",
             tmp_path / "no",
