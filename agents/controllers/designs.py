@@ -109,7 +109,9 @@ def tuned(kind: str, task: BenchmarkTask, suite: str, run: int = 0) -> Controlle
         found = load_tuned(suite).get(task.name, {})
         bases = [name for name in found if name not in NO_BASES]
         kind = min(bases, key=lambda one: found[one][0]["cost"], default=kind)
-    return design(kind, task, tuned_runs(kind, task, suite)[run]["settings"])
+    runs = tuned_runs(kind, task, suite)
+    settings = runs[run]["settings"]
+    return design(kind, task, settings)
 
 
 def tuned_runs(kind: str, task: BenchmarkTask, suite: str) -> list[dict[str, Any]]:

@@ -451,7 +451,9 @@ def is_variable(node: Node, uses: Counter[int]) -> bool:
     n_uses = uses[id(node)]
     is_call = isinstance(node.kind, Struct) and node.text[0] not in "(%"
     is_member = node.text.startswith("%s.") and not node.hint
-    return n_uses > 0 and not is_member and (n_uses > 1 or is_call or bool(node.hint))
+    if n_uses == 0 or is_member:
+        return False
+    return n_uses > 1 or is_call or bool(node.hint)
 
 
 #: How closely operators bind, where no brackets are needed for the reader.

@@ -115,11 +115,15 @@ def _unit_instead(ratio: float, declared: str) -> str:
 def _usual_speed(log: Log) -> float:
     """Median speed over ground, m/s, by positions some seconds apart if there are."""
     if not log.has("x"):
-        return float(np.median(np.abs(_velocity_over_ground(log))))
-    rows = min(math.ceil(5.0 / usual_step(log.t)), log.t.size - 1)
+        speeds = np.abs(_velocity_over_ground(log))
+        return float(np.median(speeds))
+    apart = 5.0  # s
+    rows = math.ceil(apart / usual_step(log.t))
+    rows = min(rows, log.t.size - 1)
     signals = (log.t, log.channels["x"], log.channels["y"])
-    passed, *moved = (one[rows:] - one[:-rows] for one in signals)
-    return float(np.median(np.hypot(*moved) / passed))
+    passed, north, east = (one[rows:] - one[:-rows] for one in signals)
+    speeds = np.hypot(north, east) / passed
+    return float(np.median(speeds))
 
 
 def _mirrored(

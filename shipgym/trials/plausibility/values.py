@@ -64,9 +64,12 @@ def without_spikes(psi: Floats) -> tuple[Floats, int]:
     """
     if psi.size < 3 or np.isinf(psi).any():
         return psi, 0
-    jumps = np.abs(_wrapped(np.diff(psi))) > _LARGEST_JUMP
+    steps = _wrapped(np.diff(psi))
+    jumps = np.abs(steps) > _LARGEST_JUMP
+    jumps_to_and_fro = jumps[:-1] & jumps[1:]
     across = _wrapped(psi[2:] - psi[:-2])
-    outliers = np.flatnonzero(jumps[:-1] & jumps[1:] & (np.abs(across) < _LARGEST_JUMP))
+    neighbours_agree = np.abs(across) < _LARGEST_JUMP
+    outliers = np.flatnonzero(jumps_to_and_fro & neighbours_agree)
     if not 0 < outliers.size <= 0.01 * psi.size:
         return psi, 0
     filled = psi.copy()
