@@ -9,12 +9,14 @@ from lazy_loader import attach_stub
 from shipgym.checks import did_you_mean
 from shipgym.errors import InputError
 
-#: Classes by the names that papers have for them.
+#: Classes of `identification` by the names that papers have for them.
 IN_PAPERS = {
     "TLSSVM": "TruncatedLSSVM",
     "ABCLSSVR": "ArtificialBeeColony",
     "PSOLSSVR": "ParticleSwarm",
     "LSSVR": "LSSVM",
+    "LSSVM": "LSSVM",
+    "RMSVM": "RMSVM",
 }
 
 
@@ -32,8 +34,10 @@ def public_names(
         try:
             return get(name)
         except AttributeError:
-            meant = IN_PAPERS.get(name.upper().replace("_", ""), name)
-            near = did_you_mean(meant, listed)
+            meant = IN_PAPERS.get(name.upper().replace("_", ""))
+            near = did_you_mean(meant or name, listed)
+            if meant and meant not in listed:
+                near = f" It is identification.{meant}."
             message = f"module {package!r} has no attribute {name!r}.{near}"
             # with a name, Python adds no nearest name of its own
             raise AttributeError(message, name=name) from None

@@ -14,6 +14,7 @@ from agents.cli.command import (
     fail,
 )
 from agents.cli.identify_options import with_identify_options
+from shipgym.manoeuvres.quantiles import DRAWS
 
 if TYPE_CHECKING:
     from agents.verification.result import AutopilotResult, Verification
@@ -28,7 +29,7 @@ def autopilot_command(
     ],
     draws: Annotated[
         int, Option(min=2, help="Models drawn from the coefficient covariance.")
-    ] = 200,
+    ] = DRAWS,
     seed: Annotated[int, Option(min=0, help="Random seed of draws and episodes.")] = 0,
     *,
     options: dict[str, Any],

@@ -148,7 +148,7 @@ def criteria_table(criteria: Mapping[str, Criterion]) -> Table:
         probability = criterion.probability
         table.add_row(
             name,
-            measured_in_words(criterion),
+            str(criterion.worse_measured or "-"),
             number(criterion.value, 2),
             between(criterion.interval, 2),
             number(criterion.limit, 2),
@@ -160,20 +160,9 @@ def criteria_table(criteria: Mapping[str, Criterion]) -> Table:
     return table
 
 
-def measured_in_words(criterion: Criterion) -> str:
-    """The measured index with its standard error; a dash without one."""
-    measured = number(criterion.measured, 2)
-    if criterion.measured_error is None:
-        return measured
-    return f"{measured}±{criterion.measured_error:.2f}"
-
-
-def _verdict(criterion: Criterion) -> str | Text:
-    if criterion.passed is None and criterion.manoeuvre:
-        return Text("not decided", "yellow")
-    if criterion.passed is None:
-        return "not assessable"
-    return Text("passes", "green") if criterion.passed else Text("fails", "red")
+def _verdict(criterion: Criterion) -> Text:
+    colours = {"passes": "green", "fails": "red", "not decided": "yellow"}
+    return Text(criterion.verdict, colours.get(criterion.verdict, ""))
 
 
 def criteria_notes(criteria: Mapping[str, Criterion]) -> list[str]:

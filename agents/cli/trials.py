@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
+from shipgym.manoeuvres.quantiles import DRAWS
+
 if TYPE_CHECKING:
     from agents.cli.standard_trials import StandardTrials
 
@@ -22,7 +24,7 @@ def trials_command(
     ] = None,
     draws: Annotated[
         int, Option(min=0, help="Models drawn from an identified model's covariance.")
-    ] = 100,
+    ] = DRAWS,
     seed: Annotated[int, Option(min=0, help="Random seed of the draws.")] = 0,
     depth: Annotated[
         float | None, Option(metavar="M", help="Water depth, m; default: deep.")

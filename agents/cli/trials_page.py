@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.cli.standard_trials import StandardTrials
-from agents.verification.figures import criterion_name
+from agents.verification.figures import in_words
 from shipgym.files import write_text
 from shipgym.manoeuvres.standard import FAMILIES, Manoeuvre
 from shipgym.models import ShipModel
@@ -17,9 +17,6 @@ Figure = tuple[str, Any, str]
 
 def write_page(model: ShipModel, trials: StandardTrials, path: Path) -> None:
     """Write indices, criteria and figures as one self-contained page."""
-    criteria = {}
-    for name, criterion in trials.criteria.items():
-        criteria[criterion_name(name, criterion)] = criterion
     sections = []
     for name, family in trials.families.items():
         if family:
@@ -29,7 +26,7 @@ def write_page(model: ShipModel, trials: StandardTrials, path: Path) -> None:
         model=model,
         water=trials.water,
         draws=trials.draws,
-        criteria=criteria,
+        criteria=in_words(trials.criteria),
         sections=sections,
     )
     write_text(page, path)

@@ -31,6 +31,7 @@ from shipgym.errors import InputError, UnstableModelError
 from shipgym.files import write_json
 from shipgym.manoeuvres.criteria import with_measured
 from shipgym.manoeuvres.measured import measured_by
+from shipgym.manoeuvres.quantiles import DRAWS
 from shipgym.models import ShipModel
 from shipgym.plots import graph_objects
 from shipgym.tasks.task import course_keeping_task
@@ -47,7 +48,7 @@ def build_autopilot(
     ship_file: str | Path,
     out: str | Path,
     *,
-    draws: int = 200,
+    draws: int = DRAWS,
     seed: int = 0,
     options: Mapping[str, Any] | None = None,
     agents: Sequence[str | Path] = (),

@@ -40,6 +40,11 @@ def criterion_name(name: str, criterion: Criterion) -> str:
     return f"{words} ({criterion.manoeuvre})" if criterion.manoeuvre else words
 
 
+def in_words(criteria: Mapping[str, Criterion]) -> dict[str, Criterion]:
+    """Criteria by their names in words."""
+    return {criterion_name(name, one): one for name, one in criteria.items()}
+
+
 def band(t: Floats, values: Floats, name: str, colour: str, **more: Any) -> Any:
     """The 95 % interval of `values`, shape (n_draws, n_samples), as a filled band."""
     low, high = band_95(values)

@@ -8,14 +8,14 @@ import numpy as np
 
 import shipgym
 from agents.controllers.controller import Controller
-from agents.verification.figures import criterion_name
+from agents.verification.figures import criterion_name, in_words
 from agents.verification.result import STEP_DEG, AutopilotResult, Verification
 from identification import IdentificationResult
 from identification.judging.warnings import held_out_error
 from identification.report.view import fit_view, trial_figures
 from shipgym.files import write_text
 from shipgym.manoeuvres import Criterion
-from shipgym.pages import NONE, fixed, number, render
+from shipgym.pages import NONE, number, render
 from shipgym.plots import panels
 
 #: Name and unit of each margin.
@@ -41,7 +41,11 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
     if found is not None:
         length = float(result.model.particulars["length"])
         drawn = result_figures(result.identification, found, length)
-        data = {"figures": drawn, **designs_of(found)}
+        data = {
+            "figures": drawn,
+            "criteria": in_words(found.criteria),
+            **designs_of(found),
+        }
     page = render(
         "agents.verification/report.html",
         ship=result.ship.particulars.name,
@@ -55,8 +59,6 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
         step_deg=STEP_DEG,
         origin=_origin(result),
         trials=result.trials,
-        criterion_name=criterion_name,
-        interval=_interval,
         **data,
     )
     write_text(page, Path(path))
@@ -149,18 +151,6 @@ def _criteria_sentences(criteria: Mapping[str, Criterion]) -> list[str]:
     if undecided:
         sentences.append(f"Not decided by these trials: {', '.join(undecided)}.")
     return sentences
-
-
-def _interval(criterion: Criterion) -> str:
-    """The 95 % interval of a criterion in words."""
-    if criterion.interval is None:
-        return NONE
-    low, high = criterion.interval
-    lower = fixed(low)
-    upper = "no upper bound"
-    if high is not None:
-        upper = fixed(high)
-    return f"{lower} to {upper}"
 
 
 def designs_of(found: Verification) -> dict[str, Any]:

@@ -58,10 +58,7 @@ def verify(
         seeds=seed + np.arange(draws),
         trials=trials,
     )
-    criteria = assess_draws(
-        model, loop.draws, lambda done: tell("models drawn", done, draws)
-    )
-    criteria = {name: one for name, one in criteria.items() if one.drawn is not None}
+    criteria = _assessed(loop, tell)
     unstable = ran_away(criteria)
     stable = [loop.draws[number] for number in np.flatnonzero(~unstable).tolist()]
 
@@ -82,6 +79,15 @@ def verify(
         tracks=tuple(loop.of_counted(track) for track in tracks),
         counted=loop.counted,
     )
+
+
+def _assessed(loop: ClosedLoop, tell: Progress) -> dict[str, Criterion]:
+    """Criteria that the models can be held against."""
+    draws = loop.draws
+    found = assess_draws(
+        loop.model, draws, lambda done: tell("models drawn", done, len(draws))
+    )
+    return {name: one for name, one in found.items() if one.drawn is not None}
 
 
 def ran_away(criteria: Mapping[str, Criterion]) -> Flags:

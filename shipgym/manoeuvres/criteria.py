@@ -194,6 +194,24 @@ class Criterion:
         return self._chances.passes > self._chances.fails
 
     @property
+    def verdict(self) -> str:
+        """The verdict in words."""
+        if not self.sides:
+            return "not assessable"
+        words = {True: "passes", False: "fails", None: "not decided"}
+        return words[self.passed]
+
+    def __repr__(self) -> str:
+        """Index by the model and by trials, its limit and the verdict."""
+        if not self.sides:
+            return self.remark
+        measured = self.worse_measured
+        found = f"{self.drawn}"
+        if measured is not None:
+            found += f", measured {measured}"
+        return f"{found}; limit {self.limit:.4g} {self.unit}: {self.verdict}"
+
+    @property
     def deciding_trials(self) -> tuple[str, ...]:
         """Without verdict: the trials that were not run, one to a side."""
         if self.decided:
@@ -279,6 +297,15 @@ class Criterion:
         return fields
 
 
+class Assessment(dict[str, Criterion]):
+    """Criteria of a ship by name."""
+
+    def __repr__(self) -> str:
+        """A line for each criterion."""
+        lines = [f"{name}: {criterion}" for name, criterion in self.items()]
+        return "\n".join(lines)
+
+
 def _value_or_worse(side: Side) -> float:
     """Index of the model on a side; infinite where it has none."""
     return np.inf if side.drawn.value is None else side.drawn.value
@@ -332,14 +359,14 @@ def outside_envelope(model: ShipModel, test: Manoeuvre) -> bool:
 
 def with_measured(
     criteria: Mapping[str, Criterion], measured: Iterable[tuple[str, MeasuredIndex]]
-) -> dict[str, Criterion]:
+) -> Assessment:
     """Criteria of a ship, by her trials where they measure them.
 
     Of several trials to one side the worst counts. `measured`: as `measured_by` and
     `measured_in_file` find them; trials of another rudder angle, heading or approach
     speed are not among them.
     """
-    found = dict(criteria)
+    found = Assessment(criteria)
     for name, index in measured:
         if name in found:
             sides = _with_trial(found[name].sides, index)

@@ -6,6 +6,7 @@ import numpy as np
 
 from shipgym.checks import check_number
 from shipgym.manoeuvres.criteria import (
+    Assessment,
     Criterion,
     Side,
     outside_envelope,
@@ -19,16 +20,15 @@ from shipgym.manoeuvres.imo_rules import (
 )
 from shipgym.manoeuvres.intervals import IndexInterval, intervals_of, own_indices
 from shipgym.manoeuvres.measured import measured_in_file
+from shipgym.manoeuvres.quantiles import DRAWS
 from shipgym.models.by_name import takes_name
 from shipgym.models.ship_model import ShipModel
-
-DRAWS = 100  # of an identified ship
 
 
 @takes_name
 def imo_assessment(
     model: ShipModel, n_draws: int | None = None, seed: int | np.random.Generator = 0
-) -> dict[str, Criterion]:
+) -> Assessment:
     """Assess a ship by the criteria of MSC.137(76).
 
     They are turning, initial turning, yaw checking, course keeping and stopping.
@@ -37,7 +37,7 @@ def imo_assessment(
     rudder, or the rudder's limit where that is less, and zigzags 10/10 and 20/20, each
     to both sides; a full astern stop where the ship's equations hold for a shaft
     astern. To show how certain each verdict is, `n_draws` models are drawn from the
-    covariance of an identified ship, by default 100, and none for a ship without one.
+    covariance of an identified ship, by default 200, and none for a ship without one.
 
     Returns the criteria `advance`, `tactical_diameter`, `initial_turning`,
     `overshoot_1_10_10`, `overshoot_2_10_10`, `overshoot_1_20_20` and `stopping`. Raises
@@ -57,7 +57,7 @@ def assess_draws(
     model: ShipModel,
     draws: Sequence[ShipModel],
     progress: Callable[[int], None] | None = None,
-) -> dict[str, Criterion]:
+) -> Assessment:
     """The criteria of a model and of models drawn; `progress` is told of how many."""
     needed = imo_manoeuvres(model)
     own = own_indices(model, needed)
@@ -73,7 +73,7 @@ def assess_draws(
 
 def imo_criteria(
     model: ShipModel, found: Mapping[str, Mapping[str, IndexInterval]]
-) -> dict[str, Criterion]:
+) -> Assessment:
     """Criteria of a ship by name, from the indices of her standard manoeuvres.
 
     A manoeuvre that was not completed fails its criteria. Of an identified ship a

@@ -9,7 +9,7 @@ import numpy as np
 from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
-from shipgym.manoeuvres.quantiles import LEVELS_95, quantiles
+from shipgym.manoeuvres.quantiles import DRAWS, LEVELS_95, quantiles
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.standard import standard_manoeuvres
 from shipgym.models.by_name import takes_name
@@ -89,7 +89,8 @@ class IndexInterval:
             "never_reached": self.n_never_reached,
         }
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
+        """Value, interval and draws without a value."""
         text = "-" if self.value is None else f"{self.value:.4g}"
         interval = self.interval
         if interval is not None:
@@ -117,7 +118,7 @@ class IndexInterval:
 def index_intervals(
     model: ShipModel,
     manoeuvre: str | Evaluation = "zigzag 20/20, starboard first",
-    n_draws: int = 200,
+    n_draws: int = DRAWS,
     seed: int | np.random.Generator = 0,
 ) -> dict[str, IndexInterval]:
     """Indices of a manoeuvre with their 95 % intervals over a model's covariance.

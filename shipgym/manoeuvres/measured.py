@@ -38,6 +38,9 @@ class MeasuredIndex:
     #: manoeuvre has it
     predicted: float | None = None
 
+    def __str__(self) -> str:
+        return f"{self.value:.2f}±{self.error:.2f} {self.side}"
+
     def share_below(self, limit: float) -> float:
         """Probability that the ship's own index is within a limit."""
         if self.error == 0.0:

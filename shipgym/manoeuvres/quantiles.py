@@ -4,6 +4,8 @@ import numpy as np
 
 from shipgym.arrays import Floats
 
+#: Models drawn where the caller does not say: one number for all verdicts.
+DRAWS = 200
 #: Shares of the draws below the lower and the upper end of the interval.
 LEVELS_95 = (0.025, 0.975)
 #: Standard deviations from the mean of a normal distribution to either end.

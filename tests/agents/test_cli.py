@@ -8,6 +8,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from inspect import signature
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -19,7 +20,10 @@ import agents
 import identification
 from agents import PID
 from agents.cli import app, shared_options
+from agents.cli.autopilot import autopilot_command
+from agents.cli.trials import trials_command
 from agents.jobs import JobError
+from agents.verification.chain import build_autopilot
 from shipgym import (
     InputError,
     ManoeuvreError,
@@ -204,6 +208,14 @@ def test_trials_tells_indices_and_criteria():
     assert told["imo"]["advance"]["value"] < 4.5
 
 
+def test_trials_and_autopilot_judge_by_the_same_draws():
+    drawn = [
+        {name: signature(one).parameters[name].default for name in ("draws", "seed")}
+        for one in (trials_command, autopilot_command, build_autopilot)
+    ]
+    assert drawn == [{"draws": 200, "seed": 0}] * 3
+
+
 def test_trials_writes_figures_that_work_offline(tmp_path):
     answer = shipgym("trials", "mariner", "--out", tmp_path / "plots.html")
     assert answer.exit_code == 0
@@ -278,6 +290,8 @@ def test_an_unknown_name_is_refused_with_the_nearest_and_that_of_papers():
     ):
         with pytest.raises(AttributeError, match=f"Did you mean '{near}'"):
             getattr(package, name)
+    with pytest.raises(AttributeError, match=r"It is identification\.TruncatedLSSVM"):
+        _ = sys.modules["shipgym"].TLSSVM
 
 
 def failing_command(error):

@@ -128,8 +128,11 @@ def test_the_chain_prints_its_tables(chain, capsys):
     table = printed.partition("models drawn, best first")[2]
     places = [table.index(f"\n{name.upper()} ") for name in metrics["ranking"]]
     assert places == sorted(places)
-    for name in metrics["imo"]:
+    for name, criterion in chain[1].verification.criteria.items():
         assert name in printed
+        if criterion.measured is not None:
+            assert str(criterion.worse_measured).endswith(criterion.side)
+            assert str(criterion.worse_measured) in printed
     assert "report: report.html" in printed
 
 

@@ -92,6 +92,9 @@ def test_a_trial_to_one_side_decides_no_pass_that_the_model_leaves_open():
         "starboard",
     )
     assert found.deciding_trials == ("10/10 zigzag, port first",)
+    assert repr(found) == (
+        "15 [13.32, 17.24], measured 12.10±0.10 starboard; limit 13.8 deg: not decided"
+    )
     assert found.note == (
         "not decided by these trials: it was measured to starboard alone, and"
         " otherwise the models drawn lie on both sides of the limit; run a 10/10"
