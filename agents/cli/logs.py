@@ -281,9 +281,12 @@ def look_command(
         Path,
         Argument(metavar="LOG|SHIP.TOML", help="A log, or a ship file with trials."),
     ],
-    out: Annotated[Path, Option(metavar="FILE", help="The page to write.")] = Path(
-        "look.html"
-    ),
+    out: Annotated[
+        Path | None,
+        Option(
+            metavar="FILE", help="The page to write; by default look-LOG.html, here."
+        ),
+    ] = None,
 ) -> None:
     """Draw the trials of a ship file, or a log.
 
@@ -297,6 +300,7 @@ def look_command(
     from shipgym.trials.guesses import guess_trial
     from shipgym.trials.ship_file import ShipFile
 
+    out = out or Path(f"look-{log.stem}.html")
     check_page(out, plots=True)
     if log.suffix == ".toml":
         ship_file = ShipFile.load(log)

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -17,7 +17,7 @@ from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import USES, Trial, cut_trials, trial_of
 from shipgym.trials.trial_entries import TrialEntry, read_entries
-from shipgym.trials.trial_import import import_tables
+from shipgym.trials.trial_import import import_tables, lacking
 
 _SECTIONS = (
     "ship",
@@ -35,6 +35,8 @@ _SECTIONS = (
 _LINE = re.compile(
     r'[ \t]*([\w.-]+)[ \t]*=[ \t]*"decide"[ \t]*(?:#[ \t]*DECIDE:[ \t]*(.*)|#.*)?'
 )
+#: A speed that `new-ship` guessed and nobody changed.
+_GUESSED_SPEED = re.compile(r"^speed = .*# guessed: ", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class ShipFile:
     particulars : Particulars
         As given; ``particulars.completed()`` estimates the rest.
     steering : SteeringGear or None
-        None where the file has no ``[steering]``.
+        None where ``[steering]`` gives nothing.
     identify : dict
         Options of the identification as they stand in ``[identify]``, the table
         ``[wind]`` among them; `identification.pipeline.reading` checks them.
@@ -79,11 +81,14 @@ class ShipFile:
         remedy.
         """
         path = Path(path)
-        data, undecided = _read_decided(path)
+        text, undecided = _read_decided(path)
+        data = parse_toml(text, f"{path}:")
         check_keys(data, _SECTIONS, str(path))
         particulars = _read_particulars(path, data)
+        if _GUESSED_SPEED.search(text):
+            particulars = replace(particulars, estimated=frozenset({"speed"}))
         steering = structure = None
-        if "steering" in data:
+        if data.get("steering", {}) != {}:
             where = f"{path}: [steering]"
             steering = SteeringGear.from_mapping(data["steering"], where)
         if "structure" in data:
@@ -117,14 +122,18 @@ class ShipFile:
 
     def faults(self) -> list[str]:
         """What is left to decide, and what is wrong with each log; empty if nothing."""
-        faults = [*self.undecided]
-        for entry in self.entries:
-            try:
-                if entry.use != "skip":
-                    self._read(entry)
-            except InputError as error:
-                faults.append(str(error))
-        return faults
+        used = [entry for entry in self.entries if entry.use != "skip"]
+        of_logs = [fault for entry in used for fault in self._faults(entry)]
+        return [*self.undecided, *of_logs]
+
+    def _faults(self, entry: TrialEntry) -> list[str]:
+        """What is wrong with a log, or what it lacks to identify a model."""
+        try:
+            first, *_ = self._read(entry)
+        except InputError as error:
+            return [str(error)]
+        known = {*first.channels, *(["u"] if self.particulars.speed else [])}
+        return [f"{entry.where}: {words}" for words in lacking(known)]
 
     def trial(self, file: str) -> Trial:
         """Read one trial by its ``file``, whatever its use; of a cut log the first."""
@@ -178,14 +187,14 @@ def _read_options(path: Path, data: Mapping[str, Any]) -> dict[str, Any]:
     return options
 
 
-def _read_decided(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Tables of a ship file without the values "decide", and a message for each.
+def _read_decided(path: Path) -> tuple[str, tuple[str, ...]]:
+    """Text of a ship file without the values "decide", and a message for each.
 
     A message names the line of the file and, from its comment, the choices.
     """
     with expecting("ship file", path):
-        data = read_toml(path, "ship file")
-    lines = read_text(path, "ship file", LARGEST_TOML).splitlines()
+        read_toml(path, "ship file")
+        lines = read_text(path, "ship file", LARGEST_TOML).splitlines()
     messages = []
     for number, line in enumerate(lines, start=1):
         match = _LINE.fullmatch(line)
@@ -196,6 +205,4 @@ def _read_decided(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
                 f' "decide"; write {choices.strip()}'
             )
             lines[number - 1] = ""
-    if messages:
-        data = parse_toml("\n".join(lines), f"{path}:")
-    return data, tuple(messages)
+    return "\n".join(lines), tuple(messages)

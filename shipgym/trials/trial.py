@@ -155,7 +155,7 @@ class Trial:
                 f" {quoted(unknown)}"
             )
         if kind is not None:
-            check_choice(kind, KINDS, f"{where}: kind")
+            check_kind(kind, f"{where}: kind")
         check_choice(use, USES, f"{where}: use")
         if length is not None:
             length = check_number(length, f"{where}: length", above=0.0)
@@ -381,6 +381,15 @@ class Trial:
         rows = np.column_stack([self[name] for name in names]).tolist()
         lines = [",".join(names), *(",".join(map(repr, row)) for row in rows), ""]
         write_text("\n".join(lines), Path(path))
+
+
+def check_kind(kind: Any, where: str) -> None:
+    """Refuse a kind of manoeuvre that is not known."""
+    use = (
+        " (of a zigzag the overshoots are measured, of a turning-circle advance and"
+        " diameter; leave it out of another manoeuvre)"
+    )
+    check_choice(kind, KINDS, where, use)
 
 
 def trial_of(log: Log, name: str, samples: slice = slice(None), **facts: Any) -> Trial:

@@ -13,7 +13,7 @@ from shipgym.ships.particulars import Particulars
 from shipgym.trials.columns import Column, parse_columns
 from shipgym.trials.conventions import Conventions, Installation
 from shipgym.trials.cuts import check_cut
-from shipgym.trials.trial import KINDS, USES
+from shipgym.trials.trial import USES, check_kind
 
 _CONVENTIONS = ("rudder_positive", "velocity_frame", "frame", "origin", "repair")
 _KEYS = ("file", "kind", "use", "columns", "cut", "sensors", *_CONVENTIONS)
@@ -130,7 +130,7 @@ def _read_entry(
             for path in paths:
                 check_readable(path, "CSV file")
     if "kind" in table:
-        check_choice(table["kind"], KINDS, f"{where} kind")
+        check_kind(table["kind"], f"{where} kind")
     if "cut" in table:
         check_cut(table["cut"], where)
     return TrialEntry(

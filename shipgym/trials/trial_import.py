@@ -1,7 +1,7 @@
 """Conversion of the tables of a log to channels in SI units, at midship."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -84,6 +84,15 @@ def import_tables(
     return log
 
 
+def lacking(known: Collection[str]) -> list[str]:
+    """What is to be logged too, of a log with these channels."""
+    return [
+        words
+        for channels, words in _LACKING.items()
+        if not any(name in known for name in channels)
+    ]
+
+
 def _on_first_clock(other: Recording, first: Recording, known: Signals) -> Signals:
     """Channels of another file of a log on the clock of the first one.
 
@@ -154,11 +163,7 @@ def _check_channels(
 ) -> list[str]:
     """Refuse impossible and contradictory channels; remarks on what is odd."""
     locator = recordings[0].locator
-    remarks = [
-        words
-        for channels, words in _LACKING.items()
-        if not any(log.has(name) for name in channels)
-    ]
+    remarks = lacking(log.channels)
     remarks += frozen_heading(log)
     remarks += check_steps(log.t, locator)
     has_positions = any("lat" in one.locator.columns for one in recordings)

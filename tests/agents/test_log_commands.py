@@ -66,7 +66,7 @@ def test_the_record_is_drawn_on_a_page(log, monkeypatch, capsys):
     code, said = command(monkeypatch, capsys, "look", "log.csv")
     assert (code, "log.csv: 300 samples over 299 s: psi, r, delta" in said) == (0, True)
     assert "1 trial to identify a model from, with 1 remark." in said
-    page = (log / "look.html").read_text()
+    page = (log / "look-log.html").read_text()
     assert page.count("Plotly.newPlot(") == 1
     assert "The channels over time." in page
 
@@ -236,3 +236,17 @@ def test_runs_in_one_file_are_cut_and_checked_again(log, monkeypatch, capsys):
     (log / "ship.toml").write_text(text.replace("Rudder [deg]", "Ruder"))
     code, said = command(monkeypatch, capsys, *again)
     assert (code, "to correct: ship.toml: [[trials]] 1" in said) == (1, True)
+
+
+def test_what_nobody_gave_is_told_as_assumed_and_what_is_missing_as_a_fault(
+    log, monkeypatch, capsys
+):
+    rows = [f"{k};{30 + k % 9};{5 + k % 2}kn" for k in range(60)]
+    text = "\n".join(["t [s];Heading [deg];STW", *rows])
+    (log / "log.csv").write_text(text)
+    command(monkeypatch, capsys, "new-ship", "log.csv", "--length", "9")
+    ship = ShipFile.load(log / "ship.toml")
+    assert (ship.particulars.estimated, ship.steering) == ({"speed"}, None)
+    assert np.ptp(ship.trials()[0]["u"]) == pytest.approx(1852.0 / 3600.0)
+    code, said = command(monkeypatch, capsys, "new-ship", "--update", "ship.toml")
+    assert (code, "ship.toml: [[trials]] 1: no rudder angle" in said) == (1, True)

@@ -104,7 +104,9 @@ def test_unsound_arrays_are_refused(t, channels, message):
 
 
 def test_words_that_are_not_known_are_refused():
-    with pytest.raises(InputError, match=r"kind: .*Did you mean 'zigzag'"):
+    with pytest.raises(
+        InputError, match=r"kind: .*of a zigzag the overshoots.*Did you mean 'zigzag'"
+    ):
         Trial([0, 1, 2], {"r": [0, 0, 0]}, kind="zig-zag")
     with pytest.raises(InputError, match=r"use: .*'test'"):
         Trial([0, 1, 2], {"r": [0, 0, 0]}, use="test")

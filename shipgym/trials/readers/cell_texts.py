@@ -14,6 +14,7 @@ _MISSING_WORDS = re.compile(
 _STARBOARD = "s|r|stbd|stb|sb|starboard|right|steuerbord|td|tribord|estribor|右"
 _PORT = "p|l|port|bb|backbord|babord|bâbord|bd|babor|left|左"
 _NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)"
+_WITH_UNIT = re.compile(rf"([-+]?{_NUMBER}(?:[eE][-+]?\d+)?) ?([^\d\s.].*)")
 _WITH_SIDE = [
     (sign, re.compile(rf"(?:(?:{words})\.?\s*)?({_NUMBER})\s*°?(?:\s*(?:{words})\.?)?"))
     for sign, words in ((1.0, _STARBOARD), (-1.0, _PORT))
@@ -43,16 +44,19 @@ def is_number(text: str) -> bool:
 def cell_number(text: str) -> float | None:
     """A number, with a side or a unit or neither; None for other text."""
     text = text.replace("\u2212", "-")  # a minus as typographers write it
-    if units_in_cell(text):
-        text = text.split()[0]
+    match = _WITH_UNIT.fullmatch(text)
+    if match and units_in_cell(text):
+        text = match[1]
     return float(text) if is_number(text) else number_with_side(text)
 
 
 def units_in_cell(text: str) -> list[str]:
-    """Units that may stand behind a number such as "13.6 kn"; else none."""
-    number, _, unit = text.partition(" ")
-    unit = "deg" if unit == "T" else unit.lower()  # a bearing from true north
-    return spelled_units(unit) if is_number(number) else []
+    """Units that may stand behind a number such as "13.6 kn" or "5kn"; else none."""
+    match = _WITH_UNIT.fullmatch(text)
+    if match is None:
+        return []
+    unit = match[2]
+    return spelled_units("deg" if unit == "T" else unit.lower())  # T: from true north
 
 
 def number_with_side(text: str) -> float | None:
