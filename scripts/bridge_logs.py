@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from foreign_ships import ship_names, ship_of, with_shaft
 from real_ships.section import table
+from sensors import GNSS, Sensor, Sensors
 
 from agents.controllers.lq import LQ
 from agents.controllers.pid import PID
@@ -43,7 +44,6 @@ from shipgym.tasks.task import course_keeping_task
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.midship import to_project_conventions
 from shipgym.trials.resampling import Log
-from shipgym.trials.sensors import GNSS, Sensor, Sensors
 from tests.ships.mmg import MMG_SHIPS
 
 SHIPS = ("mariner", "container", "tanker", "kvlcc2", *MMG_SHIPS)

@@ -22,6 +22,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from sensors import Sensors
 
 import shipgym
 from identification import IdentificationResult, KernelResidual, identify
@@ -34,7 +35,6 @@ from shipgym.manoeuvres import (
 )
 from shipgym.manoeuvres.registry import standard_time
 from shipgym.models.catalogue import LIBRARY
-from shipgym.trials.sensors import Sensors
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

@@ -15,11 +15,13 @@ ROOT = Path(__file__).parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
+from sensors import Sensors  # noqa: E402
+
 import shipgym  # noqa: E402 - the folder above has to be found first
 from identification import IdentificationResult, identify  # noqa: E402
 from identification.judging.selection import RESPONSES  # noqa: E402
 from identification.models.refinement import whole_trials  # noqa: E402
-from shipgym import Sensors, ShipModel, Trial  # noqa: E402
+from shipgym import ShipModel, Trial  # noqa: E402
 from shipgym.errors import InputError  # noqa: E402
 from shipgym.manoeuvres import zigzag  # noqa: E402
 from tests.ships.foreign import FOREIGN  # noqa: E402

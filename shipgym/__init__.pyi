@@ -25,8 +25,6 @@ from .ships import list_structures as list_structures
 from .ships import register_structure as register_structure
 from .ships.particulars import Particulars as Particulars
 from .ships.steering import SteeringGear as SteeringGear
-from .trials.sensors import Sensor as Sensor
-from .trials.sensors import Sensors as Sensors
 from .trials.ship_file import ShipFile as ShipFile
 from .trials.trial import Trial as Trial
 

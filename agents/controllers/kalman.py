@@ -11,8 +11,8 @@ import numpy as np
 from agents.controllers.linear_loop import ERROR, RUDDER, YAW_RATE, sampled
 from shipgym import ShipModel
 from shipgym.arrays import Floats
+from shipgym.instruments.noise import SEA_TRIAL
 from shipgym.models.linear import StraightRunning, linearise
-from shipgym.trials.sensors import SEA_TRIAL
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +40,7 @@ class KalmanFilter:
 
         `noise`: in multiples of a sea trial's sensors.
         """
-        yaw_rate = SEA_TRIAL["r"]
-        heading = SEA_TRIAL["psi"]
-        deviations = noise * np.array([yaw_rate.noise, heading.noise])
+        deviations = noise * np.array([SEA_TRIAL["yaw_rate"], SEA_TRIAL["heading"]])
         return kalman_gain(
             transition=self.transition,
             process=self.process,

@@ -21,10 +21,10 @@ from agents.controllers.linear_loop import (
 )
 from agents.settings import Settings, Step, setting
 from shipgym import ShipModel
+from shipgym.instruments.noise import SEA_TRIAL
 from shipgym.models.by_name import takes_name
 from shipgym.models.linear import Nomoto, nomoto_of
 from shipgym.tasks.scales import RUDDER_WEIGHT
-from shipgym.trials.sensors import SEA_TRIAL
 
 
 @dataclass(frozen=True)
@@ -169,8 +169,8 @@ def quiet_update(gains: Mapping[str, float], noise: float, dt: float) -> float:
     standard deviation s moves by 0.8 a s (2 / (2 - a))^(1/2) in the mean. The low-pass
     takes at most a fifth of the time by which the derivative leads.
     """
-    by_rate = gains["derivative"] * SEA_TRIAL["r"].noise
-    by_heading = gains["proportional"] * SEA_TRIAL["psi"].noise
+    by_rate = gains["derivative"] * SEA_TRIAL["yaw_rate"]
+    by_heading = gains["proportional"] * SEA_TRIAL["heading"]
     deviation = noise * float(np.hypot(by_rate, by_heading))
     allowed = np.radians(10.0) / 60.0 * dt
     lead = gains["derivative"] / gains["proportional"]

@@ -8,6 +8,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 from papers.dense_dual import dense_dual_solution
+from sensors import Sensors
 
 import shipgym
 from agents.verification.chain import build_autopilot
@@ -19,7 +20,6 @@ from identification import (
     identify,
 )
 from shipgym.manoeuvres import zigzag
-from shipgym.trials.sensors import Sensors
 from speed.measure import Row, best_time
 
 Floats = NDArray[np.float64]

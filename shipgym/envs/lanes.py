@@ -15,6 +15,7 @@ from shipgym.engine.motion import Ship
 from shipgym.engine.records import LANES, flat, leaves
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES, OutputPool, Outputs
 from shipgym.envs.randomisation import Pool
+from shipgym.instruments.noise import SEA_TRIAL
 from shipgym.models import ShipModel
 from shipgym.sea.weather_column import weather_column
 from shipgym.tasks.contract import ObservationSpec
@@ -317,15 +318,7 @@ def lanes_of(tiles: NDArray[Any]) -> NDArray[Any]:
 
 def bridge_noise(multiple: float) -> dict[str, float]:
     """Settings of a bridge's noise, in multiples of that of a sea trial's sensors."""
-    # imports the readers of trials, which are needed only for noise
-    from shipgym.trials.sensors import SEA_TRIAL
-
-    channels = {"heading": "psi", "yaw_rate": "r", "speed": "u", "position": "x"}
-    noise = {}
-    for name, channel in channels.items():
-        noise[name] = multiple * SEA_TRIAL[channel].noise
-    noise["ground"] = multiple * 0.05  # m/s, of a satellite receiver
-    return noise
+    return {name: multiple * deviation for name, deviation in SEA_TRIAL.items()}
 
 
 def ship_columns(

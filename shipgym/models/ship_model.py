@@ -94,8 +94,7 @@ class ShipModel(ManoeuvringModel):
             weather x and y are over ground, u and v through the water; psi and r
             are without the first-order motion in waves, which is in `psi_wave` and
             `r_wave`; `current_north`, `current_east`, `wind_speed` and `wind_from`
-            tell the weather. What instruments show of it
-            all: `shipgym.trials.sensors.Sensors`.
+            tell the weather.
         """
         from shipgym.models.simulate import simulate  # an environment does without
 

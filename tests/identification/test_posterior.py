@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sensors import Sensors
 
 from identification import Uncertainty, identify
 from identification.judging.posterior import with_posterior
 from identification.judging.sampling import mixing_of
 from identification.judging.warnings import model_warnings
 from identification.models.sailed import CoefficientPrior
-from shipgym import InputError, Particulars, Sensors, ShipModel, SteeringGear, Trial
+from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
 
 

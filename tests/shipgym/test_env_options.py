@@ -14,10 +14,10 @@ from gymnasium.wrappers import FrameStackObservation
 import shipgym
 from shipgym import InputError
 from shipgym.envs.randomisation import N_SPEEDS, POOL_SIZE
+from shipgym.instruments.noise import SEA_TRIAL
 from shipgym.sea import Waves, Weather
 from shipgym.ships import Envelope
 from shipgym.tasks import course_keeping_task, read_definition
-from shipgym.trials.sensors import SEA_TRIAL
 
 pytestmark = pytest.mark.interpreted
 
@@ -68,12 +68,12 @@ def test_noise_has_the_deviation_of_a_sea_trials_sensors(noise):
     first = misreadings(env, env.step(idle(env))[0])
     second = misreadings(env, env.step(idle(env))[0])
     for name, channel in (
-        ("psi", "psi"),
-        ("yaw_rate", "r"),
-        ("sway", "u"),
-        ("surge", "u"),
+        ("psi", "heading"),
+        ("yaw_rate", "yaw_rate"),
+        ("sway", "speed"),
+        ("surge", "speed"),
     ):
-        deviation = noise * SEA_TRIAL[channel].noise
+        deviation = noise * SEA_TRIAL[channel]
         assert np.std(second[name]) == pytest.approx(
             deviation, rel=5.0 / np.sqrt(2 * count)
         ), name

@@ -52,10 +52,7 @@ def at(values, row, value):
         ({"psi": 57.3 * SWING}, 'declare psi = { column = "psi", unit = "deg" }'),
         ({"psi": SWING, "r": -RATE}, "got opposite signs; change the sign of the"),
         ({"psi": SWING, "r": RATE / 5.3}, "changes 5.3 times as fast as the yaw rate"),
-        (
-            {"psi": TURN, "x": X, "y": Y, "u": 0.514 * U, "v": V},
-            "a position that changes 1.95 times as fast as the velocities say; likely",
-        ),
+        ({"psi": TURN, "x": X, "y": Y, "u": U / 0.514, "v": V}, 'unit = "knots" }'),
         (
             {"psi": TURN, "x": X, "y": Y, "stw": U / 0.514},
             "0.514 times as much over ground, which no current does; likely a wrong"

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from sensors import SEA_TRIAL, Sensor, Sensors
 
-from shipgym import InputError, Sensor, Sensors, Trial, load_model, manoeuvres
-from shipgym.trials.sensors import SEA_TRIAL
+from shipgym import Trial, load_model, manoeuvres
 
 N = 40_000
 
@@ -94,22 +94,3 @@ def test_a_sea_trial_still_tells_the_overshoot(zigzag):
     assert seen == pytest.approx(
         manoeuvres.zigzag_indices(zigzag).overshoot_1_deg, abs=0.4
     )
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda t: Sensor(noise=-1.0), "sensor noise: .*-1"),
-        (lambda t: Sensor(drift=1.0, drift_time_s=0.0), "drift_time_s: .*0"),
-        (lambda t: Sensors({"speed": Sensor()}), "unknown channel 'speed'"),
-        (lambda t: Sensors({"u": 0.1}), "u: expected a Sensor, got 0.1"),
-        (
-            lambda t: Sensors(sampling_s=500.0).measure(t),
-            "sampling_s: expected at most half of the 600 s",
-        ),
-        (lambda t: Sensors().measure(t, -1), "seed: .*-1"),
-    ],
-)
-def test_wrong_arguments(zigzag, make, message):
-    with pytest.raises(InputError, match=message):
-        make(zigzag)

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sensors import Sensors
 
 import shipgym
-from shipgym import InputError, Sensors
+from shipgym import InputError
 from shipgym.envs.engine import Engine
 from shipgym.sea import (
     AIR_DENSITY,

@@ -14,6 +14,7 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from sensors import Sensor, Sensors
 
 from identification import Preprocessing, Sampling
 from identification.estimators.lssvm import LSSVM
@@ -25,7 +26,6 @@ from shipgym.manoeuvres import zigzag
 from shipgym.models import ShipModel
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
-from shipgym.trials.sensors import Sensor, Sensors
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]

@@ -14,6 +14,7 @@ from shipgym.trials.column_values import without_sentinels
 from shipgym.trials.columns import ColumnGuess
 from shipgym.trials.guesses.steering import steering_command
 from shipgym.trials.guesses.units import (
+    BY_SIZE,
     UNKNOWN,
     UnitGuess,
     named_unit,
@@ -111,7 +112,30 @@ def guess_columns(table: LogTable) -> list[ColumnGuess]:
         take(alone, "speed")
     if "t" in guesses:
         guesses["t"] = _with_date(table, guesses["t"], free)
+    if guesses.keys().isdisjoint(("lat", "x")):
+        _guess_speeds(table, guesses)
     return [guesses[channel] for channel in known if channel in guesses]
+
+
+def _guess_speeds(table: LogTable, guesses: dict[str, ColumnGuess]) -> None:
+    """Take the usual unit of speeds that neither a name nor positions tell."""
+    unknown = {}
+    for channel in ("sog", "stw", "u", "v"):
+        guess = guesses.get(channel)
+        if guess is not None and guess.reason.startswith(BY_SIZE):
+            unknown[channel] = table.likely_numbers(guess.name)
+    sizes = [np.nanmax(np.abs(one)) for one in unknown.values() if one is not None]
+    largest = max(sizes, default=0.0)
+    is_si = any(guess.unit in ("rad", "rad/s") for guess in guesses.values())
+    fastest = 15.0 if is_si else 3.0  # that is likelier in m/s
+    beside = ", with angles in rad" if is_si else ""
+    reason = (
+        f"is a guess: there are no positions that tell, up to {largest:.4g}{beside};"
+        " knots, m/s or km/h"
+    )
+    unit = "m/s" if largest <= fastest else "knots"
+    for channel in unknown:
+        guesses[channel] = replace(guesses[channel], unit=unit, reason=reason)
 
 
 def _quaternion(table: LogTable, free: list[str]) -> ColumnGuess | None:

@@ -15,7 +15,6 @@ from shipgym.errors import InputError
 from shipgym.trials.columns import ColumnGuess
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.guesses.columns import RUDDERS, guess_columns
-from shipgym.trials.guesses.speeds import settle_speeds
 from shipgym.trials.guesses.units import UNKNOWN, unit_by_size
 from shipgym.trials.readers.cell_texts import number_with_side
 from shipgym.trials.readers.kinds import read_log
@@ -115,12 +114,13 @@ class TrialGuess:
 
     def take(self, name: str, value: str, reason: str) -> None:
         """Read the log with a unit or a convention from now on."""
+        if name not in QUANTITIES:
+            self.conventions.append(ConventionGuess(name, value, reason))
+        together = ("u", "v") if name == "u" else (name,)
         for k, one in enumerate(self.columns):
-            if one.channel == name:
+            if one.channel in together:
                 because = f"by the check that refused {one.unit} ({one.reason})"
                 self.columns[k] = replace(one, unit=value, reason=because)
-                return
-        self.conventions.append(ConventionGuess(name, value, reason))
 
     def read(self) -> Trial:
         """Read the log with the guesses so far."""
@@ -207,7 +207,7 @@ def _guess_tables(guess: TrialGuess) -> None:
         _check_numbers(table)
         found = {one.channel: one for one in guess_columns(table)}
         guess.decisions += _unknown_units(found)
-        for channel, one in settle_speeds(table, found).items():
+        for channel, one in found.items():
             if len(tables) > 1 and channel != "t":
                 one = replace(one, reason=f"{one.reason}; from {table.path.name}")
             columns.setdefault(channel, one)

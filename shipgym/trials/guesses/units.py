@@ -33,6 +33,7 @@ _DAYS = {
 }
 
 
+BY_SIZE = "from its size"
 #: Stands for a unit that is none of those which are known.
 UNKNOWN = "?"
 #: What stands in brackets behind a name and is no unit.
@@ -102,7 +103,7 @@ def unit_by_size(values: Floats | None, channel: str) -> UnitGuess:
     limit, other = _BY_SIZE.get(channel, of_quantity)
     if largest > limit:
         unit = other
-    return UnitGuess(unit, f"from its size, up to {largest:.4g}")
+    return UnitGuess(unit, f"{BY_SIZE}, up to {largest:.4g}")
 
 
 def _time_by_size(values: Floats) -> UnitGuess:

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
-from shipgym.trials.columns import Locator
+from shipgym.trials.columns import ColumnGuess, Locator
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.resampling import Log, usual_step
@@ -70,7 +70,8 @@ def check_over_ground(
 def check_speed_units(log: Log, locator: Locator) -> None:
     """Refuse a speed that is to the one over ground as one unit is to another.
 
-    No current changes the speed of a ship by so much. The channels are in SI units.
+    No current changes the speed of a ship by so much; of a unit that was guessed the
+    nearest one is right. The channels are in SI units.
     """
     over_ground = _usual_speed(log)
     if over_ground < _SLOWEST:
@@ -79,8 +80,10 @@ def check_speed_units(log: Log, locator: Locator) -> None:
     for channel in speeds.keys() & locator.columns.keys():
         ratio = over_ground / max(speeds[channel], 1e-9)
         column = locator.columns[channel]
-        unit = _unit_instead(ratio, column.unit)
-        if not unit:
+        is_guess = isinstance(column, ColumnGuess) and not column.is_named
+        unit = _unit_instead(ratio, column.unit, 0.3 if is_guess else 0.16)
+        is_usual = 0.6 < ratio < 1.67 and not is_guess
+        if is_usual or unit in ("", column.unit):
             continue
         raise InputError(
             f"{locator.path}: expected column '{column.name}' to agree with the speed"
@@ -96,20 +99,18 @@ def _speeds(log: Log) -> dict[str, float]:
     speeds = {"stw": channels["stw"]} if log.has("stw") else {}
     if log.has("x", "ground_north"):
         speeds["sog"] = np.hypot(channels["ground_north"], channels["ground_east"])
-    if log.has("u") and not log.has("v"):
-        speeds["u"] = channels["u"]
+    if log.has("u"):
+        speeds["u"] = np.hypot(channels["u"], channels.get("v", 0.0))
     return {name: float(np.median(np.abs(one))) for name, one in speeds.items()}
 
 
-def _unit_instead(ratio: float, declared: str) -> str:
+def _unit_instead(ratio: float, declared: str, apart_at_most: float) -> str:
     """Unit of a speed that is wrong by a ratio; empty where none fits."""
-    if 0.6 < ratio < 1.67:
-        return ""
     factors = UNITS["speed"]
     sought = ratio * factors[declared]
     apart = {unit: abs(math.log(one / sought)) for unit, one in factors.items()}
     nearest = min(apart, key=lambda unit: apart[unit])
-    return nearest if apart[nearest] < 0.16 else ""
+    return nearest if apart[nearest] < apart_at_most else ""
 
 
 def _usual_speed(log: Log) -> float:
