@@ -58,19 +58,17 @@ def plot(
     t: Floats, channels: Mapping[str, Floats], name: str, ax: Any, **line: Any
 ) -> Any:
     """Draw a channel over time, or "path", on axes of matplotlib; see `Trial.plot`."""
-    drawn = {}
-    for known, of in CHANNEL_AXES.items():
-        values = quantity(channels, known)
-        if values is not None:
-            drawn[known] = of.factor * values
-    with_path = ["path"] if "x" in channels and "y" in channels else []
-    check_choice(name, [*drawn, *with_path], "channel")
+    known = [one for one in CHANNEL_AXES if quantity(channels, one) is not None]
+    if {"x", "y"} <= channels.keys():
+        known.append("path")
+    check_choice(name, known, "channel")
     ax = axes_of(ax)
     if name == "path":
-        ax.plot(drawn["y"], drawn["x"], **line)
+        ax.plot(channels["y"], channels["x"], **line)
         ax.set(xlabel=CHANNEL_AXES["y"].title, ylabel=CHANNEL_AXES["x"].title)
         ax.set_aspect("equal", "datalim")
     else:
-        ax.plot(t, drawn[name], **line)
-        ax.set(xlabel="time, s", ylabel=CHANNEL_AXES[name].title)
+        axis = CHANNEL_AXES[name]
+        ax.plot(t, axis.factor * np.asarray(quantity(channels, name)), **line)
+        ax.set(xlabel="time, s", ylabel=axis.title)
     return ax

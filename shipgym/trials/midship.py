@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
 from shipgym.trials.conventions import Conventions, Installation
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.navigation import rotate_to_body, set_and_drift
@@ -56,17 +55,9 @@ def _derive_turning(log: Log) -> None:
 
 def _earth_to_body(log: Log) -> None:
     """Turn north and east velocities by the recorded heading."""
-    for name in ("u", "v", "psi"):
-        if not log.has(name) or name in log.derived:
-            raise InputError(
-                f'{log.where}: velocity_frame = "earth": expected u (north), v (east)'
-                f" and the heading psi, got no recorded {name}; name their columns, or"
-                " leave u and v out"
-            )
-    channels = log.channels
-    channels["u"], channels["v"] = rotate_to_body(
-        channels["u"], channels["v"], channels["psi"]
-    )
+    what = 'u and v of velocity_frame = "earth"'
+    recorded = (log.needed(name, what) for name in ("u", "v", "psi"))
+    log.channels["u"], log.channels["v"] = rotate_to_body(*recorded)
 
 
 def _cg_to_midship(log: Log, xg: float) -> None:
@@ -83,11 +74,8 @@ def _cg_to_midship(log: Log, xg: float) -> None:
     channels = log.channels
     for name in moves.keys() & channels.keys():
         other, factor = moves[name]
-        if not log.has(other):
-            raise InputError(
-                f'{log.where}: origin = "cg": expected {other} to move {name} to'
-                " midship, got none; name its column"
-            )
+        if other not in channels:
+            log.needed(other, f'{name} of origin = "cg"')
         channels[name] = channels[name] + xg * factor(channels[other])
 
 
@@ -108,10 +96,7 @@ def _to_midship(
         channels.pop("ground_north", None)
         channels.pop("ground_east", None)
     elif (is_elsewhere or log.has("ground_north")) and not log.has("psi"):
-        raise InputError(
-            f"{log.where}: expected a column psi, the heading, with positions or"
-            " velocities of GNSS, got none"
-        )
+        log.needed("psi", "positions or velocities of GNSS")
     if is_elsewhere and log.has("x", "y"):
         north, east = rotate_to_body(
             installation.forward, installation.starboard, -channels["psi"]

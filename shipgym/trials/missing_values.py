@@ -27,17 +27,14 @@ def check_time(t: Floats, locator: Locator) -> None:
     earlier, later = (
         locator.in_file("t", one, digits=10) for one in t[row - 1 : row + 1]
     )
-    back = t[row - 1] - t[row]
     change = f"goes back from {earlier} to {later}"
-    if back <= 0.0:
+    if t[row] >= t[row - 1]:
         change = f"stands still at {later}"
-    remedy = "sort the rows, remove the repeated ones"
-    if 1700.0 < back < 3700.0:
-        remedy = "where a clock was set back, as at the end of summer, log UTC"
     raise InputError(
         f"{locator.place(row, 't')}: expected time to increase from row to row, got one"
-        f" that {change}; {remedy}, keep those of one receiver, or split the file into"
-        " one per run"
+        f" that {change}; sort the rows, remove the repeated ones, keep those of one"
+        " receiver, split the file into one per run, or log UTC where a clock was set"
+        " back, as at the end of summer"
     )
 
 

@@ -58,6 +58,13 @@ class Recording:
     start: float | None
     notes: list[str]
 
+    @property
+    def is_magnetic(self) -> bool:
+        """True if the heading counts from magnetic north, as its name says too."""
+        columns = self.locator.columns
+        name = columns["psi"].name if "psi" in columns else ""
+        return self.locator.table.magnetic or "mag" in name.lower()
+
 
 def read_recording(
     table: LogTable,

@@ -1,5 +1,6 @@
 """Channels that were logged on clocks of their own, and one clock for all."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -7,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from shipgym.arrays import Flags, Floats
+from shipgym.arrays import Flags, Floats, integral
 from shipgym.errors import InputError
 
 #: Fewest samples of a trial, and of a channel.
@@ -60,9 +61,24 @@ class Log:
     start: float | None = None
     magnetic: bool = False
 
+    def needed(self, channel: str, what: str) -> Floats:
+        """A channel with which another is converted; InputError where it is absent."""
+        if channel not in self.channels or channel in self.derived:
+            raise InputError(
+                f"{self.where}: expected {channel} to convert {what}, got none; name"
+                " its column"
+            )
+        return self.channels[channel]
+
     def has(self, *channels: str) -> bool:
         """Return whether the log has all of these channels."""
         return all(channel in self.channels for channel in channels)
+
+    @property
+    def heading(self) -> Floats:
+        """Heading, or that which follows from the yaw rate; without jumps, rad."""
+        psi = self.channels.get("psi")
+        return integral(self.t, self.channels["r"]) if psi is None else psi
 
     def derive(self, channel: str, values: Floats) -> None:
         """Add a channel that follows from others."""
@@ -73,6 +89,12 @@ class Log:
 def usual_step(t: npt.NDArray[Any]) -> float:
     """Median step between samples, such as times in s."""
     return float(np.median(np.diff(t)))
+
+
+def changes(t: Floats, seconds: float, *signals: Floats) -> list[Floats]:
+    """Changes of the time and of signals over some seconds, at least one step."""
+    rows = min(math.ceil(seconds / usual_step(t)), t.size - 1)
+    return [one[rows:] - one[:-rows] for one in (t, *signals)]
 
 
 def have_own_clocks(t: Floats, channels: Mapping[str, Floats]) -> bool:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipgym.arrays import Floats, integral
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.trials.resampling import Log, usual_step
 from shipgym.trials.units import DEGREE
@@ -91,15 +91,9 @@ def _side(value: float, evidence: str, *, is_sure: bool) -> RudderSide:
 
 def check_rudder_side(log: Log) -> None:
     """Refuse a rudder that is positive to port, by the turning that follows it."""
-    channels = log.channels
-    is_turning = log.has("psi") or log.has("r")
-    if not log.has("delta") or not is_turning:
+    if not log.has("delta") or not (log.has("psi") or log.has("r")):
         return
-    psi = channels.get("psi")
-    if psi is None:
-        psi = integral(log.t, channels["r"])
-    delta = channels["delta"]
-    found = rudder_side(log.t, psi, delta)
+    found = rudder_side(log.t, log.heading, log.channels["delta"])
     if found.side == "port" and found.is_sure:
         raise InputError(
             f"{log.where}: expected a positive rudder to turn the bow to starboard, got"

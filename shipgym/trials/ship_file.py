@@ -135,14 +135,6 @@ class ShipFile:
         known = {*first.channels, *(["u"] if self.particulars.speed else [])}
         return [f"{entry.where}: {words}" for words in lacking(known)]
 
-    def trial(self, file: str) -> Trial:
-        """Read one trial by its ``file``, whatever its use; of a cut log the first."""
-        files = [entry.file for entry in self.entries]
-        check_choice(file, files, f"{self.path}: trial")
-        number = files.index(file)
-        first, *_ = self._read(self.entries[number])
-        return first
-
     def _read(self, entry: TrialEntry) -> list[Trial]:
         """Trials of a log: one, or those that it is cut into."""
         facts: dict[str, Any] = {

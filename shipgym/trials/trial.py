@@ -148,12 +148,6 @@ class Trial:
             check_channel(channel, where, time=False)
             arrays[channel] = _frozen_array(values, f"{where}: {channel}", times.size)
         _check_angles(times, arrays, where)
-        unknown = sorted(set(derived) - arrays.keys())
-        if unknown:
-            raise InputError(
-                f"{where}: derived: expected some of {quoted(arrays)}, got"
-                f" {quoted(unknown)}"
-            )
         if kind is not None:
             check_kind(kind, f"{where}: kind")
         check_choice(use, USES, f"{where}: use")
@@ -238,13 +232,6 @@ class Trial:
 
     def with_(self, **changes: Any) -> Trial:
         """Return a copy with a changed name, kind, use, length or ``over_ground``."""
-        known = ["name", "kind", "use", "length", "over_ground"]
-        unknown = sorted(changes.keys() - known)
-        if unknown:
-            raise InputError(
-                f"trial '{self.name}': cannot change {quoted(unknown)}, only"
-                f" {', '.join(known)}"
-            )
         return Trial(self.t, self.channels, **(self._settings() | changes))
 
     def with_channels(

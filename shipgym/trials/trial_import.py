@@ -74,7 +74,7 @@ def import_tables(
     log = on_one_clock(signals, first.locator.path)
     remarks = _check_channels(log, recordings, conventions)
     notes = [note for one in recordings for note in one.notes]
-    log.magnetic = any(table.magnetic for table in tables)
+    log.magnetic = any(one.is_magnetic for one in recordings)
     log.magnetic &= conventions.installation.heading_offset == 0.0
     if log.magnetic:
         notes.append(_MAGNETIC)
@@ -99,11 +99,6 @@ def _on_first_clock(other: Recording, first: Recording, known: Signals) -> Signa
     Raises InputError for channels that are known already, and for other times.
     """
     path = other.locator.table.path
-    if (first.start is None) != (other.start is None):
-        raise InputError(
-            f"{path}: expected times that count from one moment in all files of"
-            " this log, got clock times in one of two only"
-        )
     repeated = known.keys() & other.signals.keys()
     if repeated:
         names = quoted(sorted(repeated))
@@ -168,7 +163,7 @@ def _check_channels(
     remarks += check_steps(log.t, locator)
     has_positions = any("lat" in one.locator.columns for one in recordings)
     if has_positions or log.has("ground_north"):
-        remarks += check_over_ground(log, conventions, locator)
+        check_over_ground(log, conventions, locator)
     if log.has("x", "y") or log.has("ground_north"):
         for one in recordings:
             check_speed_units(log, one.locator)

@@ -2,7 +2,7 @@
 
 import math
 from fnmatch import fnmatchcase
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
@@ -46,20 +46,9 @@ def si_factor(channel: str, unit: str, where: str = "unit") -> float:
     fitting = UNITS[quantity]
     if isinstance(unit, str) and unit in fitting:
         return fitting[unit]
-    raise _no_such_unit(unit, quantity, where)
-
-
-def _no_such_unit(unit: Any, quantity: str, where: str) -> InputError:
-    fitting = UNITS[quantity]
-    expected = quoted(fitting)
-    name = str(unit)
-    hint = did_you_mean(name, fitting)
-    for other, units in UNITS.items():
-        if name in units:
-            hint = f" '{unit}' is a unit of {other}"
-            break
-    return InputError(
-        f"{where}: expected a unit of {quantity} ({expected}), got {unit!r}.{hint}"
+    raise InputError(
+        f"{where}: expected a unit of {quantity} ({quoted(fitting)}), got"
+        f" {unit!r}.{did_you_mean(str(unit), fitting)}"
     )
 
 

@@ -112,7 +112,7 @@ def test_forces_and_motion_are_moved_from_the_centre_of_gravity_to_midship(tmp_p
     assert trial["y"][0] == pytest.approx(19.0)
     for name, other in (("v", "r"), ("x", "psi"), ("N", "Y")):
         written(path, t=np.arange(4.0), **{name: np.zeros(4)})
-        message = f"expected {other} to move {name} to mid"
+        message = f"expected {other} to convert {name} of origin"
         assert message in refusal(path, origin="cg", xg=2.0)
 
 
@@ -250,7 +250,6 @@ def test_time_that_stands_still_or_goes_back_is_refused(tmp_path):
     for t, message in (
         ([0.0, 1.0, 1.0, 2.0], "line 4 (data row 3), column 't': expected time to"),
         ([0.0, 1.0, 0.5, 2.0], "got one that goes back from 1 s to 0.5 s; sort the"),
-        ([0.0, 3600.0, 1.0, 2.0], "where a clock was set back, as at the end of"),
         ([0.0, 1.0], "expected at least 3 rows below the header, got 2"),
     ):
         path = written(tmp_path / "run.csv", t=np.array(t), u=np.ones(len(t)))

@@ -110,8 +110,6 @@ def test_words_that_are_not_known_are_refused():
         Trial([0, 1, 2], {"r": [0, 0, 0]}, kind="zig-zag")
     with pytest.raises(InputError, match=r"use: .*'test'"):
         Trial([0, 1, 2], {"r": [0, 0, 0]}, use="test")
-    with pytest.raises(InputError, match="derived: expected some of 'r', got 'psi'"):
-        Trial([0, 1, 2], {"r": [0, 0, 0]}, derived=["psi"])
 
 
 def test_the_hash_follows_the_contents_only():
@@ -137,8 +135,6 @@ def test_a_trial_survives_a_pickle_immutable():
         copy.use = "fit"
     other = trial.with_(use="fit", kind="random")
     assert (other.use, other.kind, other.sha256) == ("fit", "random", trial.sha256)
-    with pytest.raises(InputError, match="cannot change 't'"):
-        trial.with_(t=[0, 1, 2])
 
 
 # --- CSV: what comes in
@@ -220,7 +216,6 @@ def test_a_noisy_heading_gives_a_yaw_rate_that_is_better_than_differences(tmp_pa
             {"r": {"column": "u", "unit": "knots"}},
             "expected a unit of angular rate ('rad/s', ",
         ),
-        ({"r": {"column": "u", "unit": "knots"}}, "'knots' is a unit of speed"),
         ({"u": {"column": "u", "unit": "knot"}}, "Did you mean 'knots'?"),
         ({"u": {"column": "u", "unit": 3}}, "got 3"),
         (

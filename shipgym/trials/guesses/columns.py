@@ -140,21 +140,19 @@ def _guess_speeds(table: LogTable, guesses: dict[str, ColumnGuess]) -> None:
 
 def _quaternion(table: LogTable, free: list[str]) -> ColumnGuess | None:
     """A heading of four columns of one name whose squares sum to 1; or None."""
-    by_stem: dict[str, dict[str, str]] = {}
-    for column in free:
-        match = re.fullmatch(r"(.*?)[\[_.]*([wxyz0-4])\]?", column.lower())
-        if match:
-            by_stem.setdefault(match[1], {})[match[2]] = column
-    for columns, endings in product(by_stem.values(), _QUATERNIONS):
-        names = [columns[one] for one in endings if one in columns]
+    for first, endings in product(free, _QUATERNIONS):
+        stem, found, bracket = first.rpartition(endings[0])
+        names = [stem + one + bracket for one in endings]
+        if not found or not set(names) <= {*free}:
+            continue
         parts = [table.likely_numbers(name) for name in names]
         known = [one for one in parts if one is not None]
         if len(known) < 4:
             continue
         length = np.sum(np.square(known), axis=0)
         is_unit = np.abs(length[np.isfinite(length)] - 1.0) < 0.02
-        moves = np.nanmax(np.nanstd(known, axis=1)) > 1e-6
-        if moves and is_unit.mean() > 0.99:
+        moves = np.nanstd(known[0]) > 1e-6
+        if moves and np.mean(is_unit) > 0.99:
             return ColumnGuess(
                 names[0],
                 "rad",
@@ -175,16 +173,12 @@ def _first_match(
         if unit is not None and _may_be(table, column, channel):
             fitting.append(ColumnGuess(column, channel=channel, **unit._asdict()))
     fitting.sort(key=lambda one: one.unit == UNKNOWN)
-    for pattern in patterns:
-        for guess in fitting:
-            forms = _forms(guess.name, channel)
-            if _matches(forms, [pattern]):
-                return guess
     of_unit = _column_names()["with_unit"].get(channel, [])
-    for guess in fitting:
-        forms = _forms(guess.name, channel)
-        if guess.is_named and _matches(forms, of_unit):
-            return guess
+    for pattern in (*patterns, *of_unit):
+        for guess in fitting:
+            is_known = pattern not in of_unit or guess.is_named
+            if is_known and _matches(_forms(guess.name, channel), [pattern]):
+                return guess
     return None
 
 

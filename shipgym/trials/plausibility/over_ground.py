@@ -10,7 +10,7 @@ from shipgym.errors import InputError
 from shipgym.trials.columns import ColumnGuess, Locator
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.resampling import Log, usual_step
+from shipgym.trials.resampling import Log, changes
 from shipgym.trials.units import DEGREE, UNITS
 
 _SLOWEST = 0.3  # m/s over ground, of any manoeuvre
@@ -25,13 +25,10 @@ def _velocity_over_ground(log: Log) -> npt.NDArray[np.complex128]:
     return north + 1j * east
 
 
-def check_over_ground(
-    log: Log, conventions: Conventions, locator: Locator
-) -> list[str]:
+def check_over_ground(log: Log, conventions: Conventions, locator: Locator) -> None:
     """Refuse a ship at berth, and a heading that contradicts the course over ground.
 
-    The channels are as logged, in SI units, the heading without jumps. Returns remarks
-    on the compass.
+    The channels are as logged, in SI units, the heading without jumps.
     """
     velocity = _velocity_over_ground(log)
     speed = np.abs(velocity)
@@ -44,7 +41,7 @@ def check_over_ground(
         )
     moving = speed > 0.3 * fastest  # a slow ship has no course
     if "psi" not in log.channels or np.count_nonzero(moving) < 3:
-        return []
+        return
     is_known = bool(conventions.installation.heading_offset)
     psi = log.channels["psi"][moving]
     course = np.angle(velocity[moving])
@@ -58,13 +55,6 @@ def check_over_ground(
     fault = _heading_fault(psi, course, offset_is_known=is_known)
     if fault:
         raise InputError(f"{locator.path}: expected a heading {fault}")
-    name = locator.columns["psi"].name.lower()
-    if is_known or "mag" not in name:
-        return []
-    return [
-        "the heading is magnetic by its name; write what it shows too much as"
-        " heading_offset_deg"
-    ]
 
 
 def check_speed_units(log: Log, locator: Locator) -> None:
@@ -118,11 +108,7 @@ def _usual_speed(log: Log) -> float:
     if not log.has("x"):
         speeds = np.abs(_velocity_over_ground(log))
         return float(np.median(speeds))
-    apart = 5.0  # s
-    rows = math.ceil(apart / usual_step(log.t))
-    rows = min(rows, log.t.size - 1)
-    signals = (log.t, log.channels["x"], log.channels["y"])
-    passed, north, east = (one[rows:] - one[:-rows] for one in signals)
+    passed, north, east = changes(log.t, 5.0, log.channels["x"], log.channels["y"])
     speeds = np.hypot(north, east) / passed
     return float(np.median(speeds))
 

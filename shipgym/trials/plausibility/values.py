@@ -5,10 +5,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from shipgym.arrays import Flags, Floats, integral
+from shipgym.arrays import Flags, Floats
 from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
-from shipgym.trials.resampling import Log, usual_step
+from shipgym.trials.resampling import Log, changes
 from shipgym.trials.units import (
     DEGREE,
     LARGEST_MAGNITUDES,
@@ -94,11 +94,9 @@ def check_heading(t: Floats, psi: Floats, logged: Floats, locator: Locator) -> N
     steps = np.abs(np.diff(psi))
     jumps = (steps > fastest_jump * np.diff(t)) & (steps > _LARGEST_JUMP)
     wrong = np.abs(np.diff(logged)) > _TURN_AND_JUMP
-    rows = math.ceil(0.1 / usual_step(t))  # beyond the noise of quick rows
-    turned = np.abs(psi[rows:] - psi[:-rows])
-    passed = t[rows:] - t[:-rows]
-    is_fast = turned > fastest_turn * passed
-    if not wrong.any() and is_fast.size and is_fast.mean() > 0.05:
+    passed, turned = changes(t, 0.1, psi)  # beyond the noise of quick rows
+    is_fast = np.abs(turned) > fastest_turn * passed
+    if not wrong.any() and is_fast.mean() > 0.05:
         wrong = is_fast
     remedy = 'empty the wrong cells and import with repair = "interpolate", or correct'
     proposals = []
@@ -171,14 +169,9 @@ def check_rudder_unit(log: Log, locator: Locator) -> None:
 
 def _turning(log: Log) -> tuple[float, float]:
     """Range of the heading, deg, and how fast it turns over some seconds, rad/s."""
-    psi = log.channels.get("psi")
-    if psi is None:
-        psi = integral(log.t, log.channels["r"])
-    rows = min(math.ceil(5.0 / usual_step(log.t)), psi.size - 1)
-    turned = psi[rows:] - psi[:-rows]
-    passed = log.t[rows:] - log.t[:-rows]
+    passed, turned = changes(log.t, 5.0, log.heading)
     rates = np.abs(turned) / passed
-    return math.degrees(np.ptp(psi)), float(np.quantile(rates, 0.95))
+    return math.degrees(np.ptp(log.heading)), float(np.quantile(rates, 0.95))
 
 
 def frozen_heading(log: Log) -> list[str]:
@@ -189,22 +182,14 @@ def frozen_heading(log: Log) -> list[str]:
     """
     if not log.has("psi", "delta"):
         return []
-    shortest = 10.0  # s
-    psi = log.channels["psi"]
-    delta = log.channels["delta"]
-    is_over = np.abs(delta) > 5.0 * DEGREE
-    stands = np.abs(np.diff(psi)) < 1e-9
-    is_frozen = stands & is_over[1:]
-    padded = np.concatenate([[False], is_frozen, [False]])
-    edges = np.flatnonzero(np.diff(padded))
-    begins = log.t[edges[::2]]
-    ends = log.t[edges[1::2]]
-    samples = np.diff(edges)[::2]
-    is_long = (ends - begins >= shortest) & (samples >= 10)
-    if not is_long.any():
+    is_over = np.abs(log.channels["delta"]) > 5.0 * DEGREE
+    stands = np.abs(np.diff(log.channels["psi"])) < 1e-9
+    moves = np.flatnonzero(~(stands & is_over[1:]))
+    stretches = np.split(log.t, moves + 1)
+    longest = max(stretches, key=np.ptp)
+    if longest.size <= 10 or np.ptp(longest) < 10.0:
         return []
-    k = int(np.argmax(np.where(is_long, ends - begins, 0.0)))
     return [
-        f"the heading stands still from {begins[k]:g} to {ends[k]:g} s while the rudder"
-        " is over: the instrument was stuck; leave that part out with cut"
+        f"the heading stands still from {longest[0]:g} to {longest[-1]:g} s while the"
+        " rudder is over: the instrument was stuck; leave that part out with cut"
     ]

@@ -87,28 +87,24 @@ def _find_rows(
     hold no values and a last one that is cut short. InputError for many others.
     """
     delimiter = layout.delimiter
-    names = lines[layout.header].strip()
+    names = lines[layout.header].strip(delimiter + " \t")
     rows: dict[int, str] = {}
     found: dict[int, int] = {}  # cells of rows that do not fit
     for number, line in enumerate(lines):
-        bare = line.strip(delimiter + " \t")
-        if number <= layout.header or number in layout.units or not bare:
+        is_title = number <= layout.header or number in layout.units
+        if is_title or line.strip(delimiter + " \t") in ("", names):
             continue
         is_plain = delimiter != BLANKS and '"' not in line
-        if is_plain and line.count(delimiter) == n_cells - 1:
-            if line.strip() != names:
-                rows[number + 1] = line
-            continue
-        cells = split(line, delimiter)
-        count = len(without_spare(cells, n_cells))
-        is_cut = number == len(lines) - 1 or not is_data(cells)
-        if count < n_cells and is_cut and rows:
-            notes.append(f"line {number + 1} is no whole row, and is left out")
-            continue
-        if line.strip() != names:
-            rows[number + 1] = line
-        if count != n_cells:
-            found[number + 1] = count
+        if not is_plain or line.count(delimiter) != n_cells - 1:
+            cells = split(line, delimiter)
+            count = len(without_spare(cells, n_cells))
+            is_cut = number == len(lines) - 1 or not is_data(cells)
+            if count < n_cells and is_cut and rows:
+                notes.append(f"line {number + 1} is no whole row, and is left out")
+                continue
+            if count != n_cells:
+                found[number + 1] = count
+        rows[number + 1] = line
     if not found:
         return rows
 
@@ -120,10 +116,7 @@ def _find_rows(
         return {line: row for line, row in rows.items() if line not in found}
     if max(found.values()) < n_cells and delimiter != BLANKS and not has_quotes:
         notes.append(f"{words} lack cells at their end, which are taken as missing")
-        missing = {line: n_cells - count for line, count in found.items()}
-        return {
-            line: row + delimiter * missing.get(line, 0) for line, row in rows.items()
-        }
+        return rows
     raise InputError(
         f"{path}: line {first} (data row {[*rows].index(first) + 1}): expected"
         f" {n_cells} cells as in the header, got {found[first]}; complete or remove the"
@@ -165,7 +158,8 @@ def _columns(
             io.StringIO("\n".join(rows)),
             sep=r"\s+" if delimiter == BLANKS else delimiter,
             header=None,
-            usecols=range(n_cells),
+            names=range(n_cells),
+            index_col=False,
             keep_default_na=False,
             na_values=[""],
             low_memory=False,

@@ -165,22 +165,21 @@ class LogTable:
                 cells[name] = parsed.numbers
                 note(name, parsed.odd, "number")
         rows = self.rows
-        odd = self._odd_times(time)
+        odd = self._without_time(time)
         if 0 < len(odd) <= max(1.0, ODD_SHARE * len(rows)):
             note(time, odd, "time, the row is left out")
             cells = {name: np.delete(column, odd) for name, column in cells.items()}
             rows = np.delete(rows, odd).tolist()
         return replace(self, cells=cells, rows=rows, notes=(*self.notes, *notes))
 
-    def _odd_times(self, name: str) -> list[int]:
-        """Rows whose time is missing, or is neither a number nor a clock time."""
-        numbers, odd = self._parse(name)
-        is_missing = np.isnan(numbers)
-        missing = np.flatnonzero(is_missing).tolist()
-        if len(odd) <= ODD_SHARE * len(numbers):
-            return missing
-        texts = self.texts(name)  # clock times
-        return [row for row in missing if not any(map(str.isdigit, texts[row]))]
+    def _without_time(self, name: str) -> list[int]:
+        """Rows whose time is missing, or has no digit."""
+        plain = self.plain_numbers(name)
+        if plain is not None:
+            is_missing = np.isnan(plain)
+            return np.flatnonzero(is_missing).tolist()
+        texts = enumerate(self.texts(name))
+        return [row for row, text in texts if not any(map(str.isdigit, text))]
 
     def _parse(self, name: str) -> _Parsed:
         """Numbers of a column and its odd rows, worked out once."""
