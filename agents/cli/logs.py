@@ -118,8 +118,8 @@ def _facts(guessed: list[TrialGuess], out: Path) -> dict[str, Any]:
     side = _rudder_side(guessed)
     speed = _service_speed(guessed)
     named = {column.channel for one in guessed for column in one.columns}
-    needs_speed = "r" in named and "psi" not in named and speed is None
-    needs_speed &= any(one.trial is not None for one in guessed)
+    was_read = any(one.trial is not None for one in guessed)
+    needs_speed = was_read and speed is None and "r" in named and "psi" not in named
     declared = [
         {one.channel: one.declaration for one in guess.columns} for guess in guessed
     ]
@@ -138,10 +138,6 @@ def _facts(guessed: list[TrialGuess], out: Path) -> dict[str, Any]:
         "decisions": list(decisions.values()),
         "to_decide": _to_decide(guessed, side, needs_speed=needs_speed),
         "side": side,
-        "no_rudder": not any(_has(one, _STEERING) for one in guessed),
-        "can_identify": any(
-            _has(one, _STEERING) and _has(one, _TURNING) for one in guessed
-        ),
         # one log with another convention is enough: others may not tell
         "conventions": list(
             {one.name: one for guess in guessed for one in guess.conventions}.values()
@@ -169,19 +165,12 @@ def _rudder_side(guessed: list[TrialGuess]) -> RudderSide | None:
     return next(iter([*known, *sides]), None)
 
 
-def _channels(guess: TrialGuess) -> set[str]:
-    """Channels that a log has by its columns or messages."""
-    in_trial = guess.trial.channels if guess.trial is not None else {}
-    return {*in_trial, *(one.channel for one in guess.columns)}
-
-
-def _has(guess: TrialGuess, channels: frozenset[str]) -> bool:
-    """Return whether a log has, or may have, one of some channels."""
-    asked = {one.key for one in guess.decisions}
-    return bool(channels & {*asked, *_channels(guess)})
-
-
-def _is_whole(channels: set[str]) -> bool:
+def _is_whole(*guessed: TrialGuess) -> bool:
+    """Return whether logs have rudder and heading, by their columns or messages."""
+    channels: set[str] = set()
+    for guess in guessed:
+        channels |= {one.channel for one in guess.columns}
+        channels.update(guess.trial.channels if guess.trial is not None else ())
     return bool(channels & _STEERING and channels & _TURNING)
 
 
@@ -203,15 +192,12 @@ def _entry(
     guess: TrialGuess, shared: list[ColumnGuess], folder: Path
 ) -> dict[str, Any]:
     """A log for the template of the ship file."""
-    of_trial = []
-    for one in guess.decisions:
-        if one.section == "trials":
-            of_trial.append(one.choices)
+    of_trial = (one.choices for one in guess.decisions if one.section == "trials")
     return {
         "file": _toml_paths(guess.paths, folder),
         "columns": [] if shared else guess.columns,
         "cut": _cut(guess),
-        "decision": next(iter(of_trial), None),
+        "decision": next(of_trial, None),
     }
 
 
@@ -250,11 +236,8 @@ def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
             guessed.append(guess_trial(log))
         except InputError as error:
             warn(f"{error}; left out of the ship file")
-    parts = [_channels(one) for one in guessed]
-    together = set().union(*parts)
-    if not any(map(_is_whole, parts)) and _is_whole(together):
-        paths = [one.paths[0] for one in guessed]
-        joined = guess_trial(*paths)
+    if not any(map(_is_whole, guessed)) and _is_whole(*guessed):
+        joined = guess_trial(*(one.paths[0] for one in guessed))
         if joined.trial is not None:
             return [joined]
     return guessed

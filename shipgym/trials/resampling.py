@@ -91,7 +91,7 @@ def usual_step(t: npt.NDArray[Any]) -> float:
     return float(np.median(np.diff(t)))
 
 
-def changes(t: Floats, seconds: float, *signals: Floats) -> list[Floats]:
+def changes(t: Floats, seconds: float, *signals: Any) -> list[Any]:
     """Changes of the time and of signals over some seconds, at least one step."""
     rows = min(math.ceil(seconds / usual_step(t)), t.size - 1)
     return [one[rows:] - one[:-rows] for one in (t, *signals)]

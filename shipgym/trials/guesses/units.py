@@ -112,16 +112,16 @@ def _time_by_size(values: Floats) -> UnitGuess:
     least, largest = known.min(initial=np.inf), known.max(initial=0.0)
     steps = np.diff(known)
     step = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 1.0
-    by_size = f"from its size, up to {largest:.4g}"
-    by_step = f"from its rows, which are {step:.3g} apart"
-    since_1970 = unit_since_1970(float(least)) if known.size else None
-    if since_1970 and step * UNITS["time"][since_1970] < 3600.0:
-        return UnitGuess(since_1970, by_size)
+    found = "s"
     for days, (first, last) in _DAYS.items():
         # apart by less than three minutes, and far less than a row in seconds
         if first < least and largest < last and step < 2e-3:
-            return UnitGuess(days, f"{by_step}, and its size, up to {largest:.4g}")
-    for finer in ("ms", "us", "ns"):
+            found = days
+    for finer in ("ns", "us", "ms"):
         if step > 20.0 and 0.005 <= step * UNITS["time"][finer] <= 20.0:
-            return UnitGuess(finer, by_step)
-    return UnitGuess("s", by_size)
+            found = finer
+    since_1970 = unit_since_1970(float(least)) if known.size else None
+    if since_1970 and step * UNITS["time"][since_1970] < 3600.0:
+        found = since_1970
+    by_step = f"{BY_SIZE}, up to {largest:.4g}, and rows {step:.3g} apart"
+    return UnitGuess(found, by_step)

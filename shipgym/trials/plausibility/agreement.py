@@ -4,23 +4,14 @@ They are compared over windows in time, so that noise and offsets do not matter.
 """
 
 import math
-from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from shipgym.arrays import Floats, integral
 from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
-from shipgym.trials.resampling import Log, usual_step
+from shipgym.trials.resampling import Log, changes, usual_step
 from shipgym.trials.units import DEGREE, QUANTITIES, UNITS
-
-
-class GainFit(NamedTuple):
-    """Least squares of a target by one regressor."""
-
-    gain: complex
-    misfit: float  # the residual's share of the target's norm
 
 
 def rate_gain(t: Floats, psi: Floats, r: Floats) -> float:
@@ -30,11 +21,22 @@ def rate_gain(t: Floats, psi: Floats, r: Floats) -> float:
     """
     turned = _without_trend(t, psi)
     expected = _without_trend(t, integral(t, r))
-    fit = _fit_changes(expected, turned)
-    gain = fit.gain.real
-    is_small = max(np.ptp(turned), np.ptp(expected)) < 2.0 * DEGREE
-    is_usual_gain = 0.2 < gain < 5.0
-    return 1.0 if is_small or fit.misfit > 0.5 or is_usual_gain else gain
+    if max(np.ptp(turned), np.ptp(expected)) < 2.0 * DEGREE:
+        return 1.0
+    known, sought = np.diff(expected), np.diff(turned)
+    gain = float(known @ sought) / max(float(known @ known), 1e-300)
+    unexplained = np.linalg.norm(sought - gain * known)
+    is_clear = unexplained < 0.5 * np.linalg.norm(sought)
+    return gain if is_clear and not 0.2 < gain < 5.0 else 1.0
+
+
+def _without_trend(t: Floats, values: Floats) -> Floats:
+    """Values at the edges of windows without their line: a rate sensor has a bias."""
+    edges = np.linspace(0, t.size - 1, num=31)
+    rows = np.unique(np.rint(edges).astype(int))
+    time = (t[rows] - t[0]) / (t[-1] - t[0])
+    left: Floats = values[rows] - np.polyval(np.polyfit(time, values[rows], 1), time)
+    return left
 
 
 def check_yaw_rate(log: Log, locator: Locator) -> None:
@@ -92,51 +94,19 @@ def check_velocity(log: Log, frame: str, locator: Locator) -> None:
     velocity = log.channels["u"] + 1j * log.channels["v"]
     heading = np.exp(1j * log.channels["psi"])
     position = log.channels["x"] + 1j * log.channels["y"]
-    fits = {
-        name: _fit_changes(
-            _at_windows(integral(log.t, over_ground)), _at_windows(position)
-        )
-        for name, over_ground in (("body", velocity * heading), ("earth", velocity))
-    }
-    declared = fits.pop(frame)
-    other_frame, other = fits.popitem()
-
-    is_off = declared.misfit > max(0.03, 5.0 * other.misfit)
-    u, v = (locator.columns[one].name for one in "uv")
-    if is_off and 0.8 < other.gain.real < 1.25:
+    misfits = {}
+    for name, over_ground in (("body", velocity * heading), ("earth", velocity)):
+        sailed = integral(log.t, over_ground)
+        _, moved, expected = changes(log.t, 10.0, position, sailed)
+        misfits[name] = np.linalg.norm(moved - expected)
+    declared = misfits.pop(frame)
+    ((other, misfit),) = misfits.items()
+    if declared > max(0.2 * np.linalg.norm(moved), 5.0 * misfit):
+        u, v = (locator.columns[one].name for one in "uv")
         raise InputError(
             f"{locator.path}: expected columns '{u}' and '{v}' to follow the positions"
             f" as velocities in the {frame} frame (velocity_frame"
-            f' = "{frame}"), got velocities in the {other_frame} frame; declare'
-            f' velocity_frame = "{other_frame}"',
-            [("velocity_frame", other_frame)],
+            f' = "{frame}"), got velocities in the {other} frame; declare'
+            f' velocity_frame = "{other}"',
+            [("velocity_frame", other)],
         )
-
-
-def _at_windows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """The values at the edges of at most 30 windows."""
-    edges = np.linspace(0, values.size - 1, num=31)
-    return values.take(np.unique(np.rint(edges).astype(int)))
-
-
-def _without_trend(t: Floats, values: Floats) -> Floats:
-    """Values at the windows' edges without their line: a rate sensor has a bias."""
-    time = _at_windows((t - t[0]) / (t[-1] - t[0]))
-    at_edges = _at_windows(values)
-    left: Floats = at_edges - np.polyval(np.polyfit(time, at_edges, deg=1), time)
-    return left
-
-
-def _fit_changes(regressor: npt.NDArray[Any], target: npt.NDArray[Any]) -> GainFit:
-    """Fit changes between windows of a target by gain times those of the regressor."""
-    known = np.diff(regressor)
-    sought = np.diff(target)
-    projection = np.vdot(known, sought)
-    power = np.vdot(known, known).real
-    size = np.linalg.norm(sought)
-    if power == 0.0 or size == 0.0:
-        return GainFit(gain=1.0 + 0.0j, misfit=1.0)
-    gain = complex(projection / power)
-    residual = sought - gain * known
-    unexplained = np.linalg.norm(residual)
-    return GainFit(gain, misfit=float(unexplained / size))

@@ -81,22 +81,17 @@ def read_parquet(path: Path, content: bytes) -> LogTable:
         file = parquet.ParquetFile(source, read_dictionary=texts)
         table = file.read()
         table.validate(full=True)  # offsets beyond the data
-        longest = sum(_longest(table[name]) for name in texts)
+        frame = table.to_pandas()
+        known = [frame[name].cat.categories for name in texts]
+        longest = sum(max(map(len, one), default=0) for one in known)
         check_unpacked(path, longest * metadata.num_rows)
-        return read_frame(table.to_pandas(), path, first=1)
+        return read_frame(frame, path, first=1)
 
 
 def _is_text(kind: Any) -> bool:
     """Return whether a type of Arrow is one of texts or bytes."""
     value = getattr(kind, "value_type", kind)  # of a dictionary
     return str(value).removeprefix("large_") in ("string", "binary")
-
-
-def _longest(column: Any) -> int:
-    """Bytes of the longest text of a column of texts numbered in a dictionary."""
-    compute = import_module("pyarrow.compute")
-    lengths = [compute.binary_length(chunk.dictionary) for chunk in column.chunks]
-    return max((compute.max(one).as_py() or 0 for one in lengths), default=0)
 
 
 def read_excel(path: Path, content: bytes) -> LogTable:

@@ -7,7 +7,7 @@ the package `nmea2000`, which has canboat's tables and knows the forms of record
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,19 +25,9 @@ _TEXT = re.compile(
 _CANDUMP = re.compile(r"can\d+\s+([0-9A-F]{8})(?:#|\s+\[\d\]\s+)([0-9A-F ]+)")
 
 
-class _Message(NamedTuple):
-    """A message: its PGN, the address of its sender, its fields by name.
-
-    A field is a value and its unit, empty where it is not said.
-    """
-
-    pgn: str
-    sender: str
-    fields: Mapping[str, tuple[Any, str]]
-
-    def value(self, name: str) -> Any:
-        """A field without its unit; None for none."""
-        return self.fields.get(name, (None, ""))[0]
+#: Fields of a message by name, each a value and its unit, empty where it is not said;
+#: ``pgn`` and ``sender`` are fields too.
+_Message = dict[str, tuple[Any, str]]
 
 
 def hear_pgns(lines: Sequence[str], heard: Heard) -> None:
@@ -63,7 +53,7 @@ def hear_pgns(lines: Sequence[str], heard: Heard) -> None:
         except (ValueError, LookupError, AttributeError):
             heard.damage(number)
             continue
-        if message is not None and message.pgn in _PGNS:
+        if message is not None and message["pgn"][0] in _PGNS:
             messages[number] = message
             before, *_ = line.partition('"fields"')
             heard.stamp(number, before[:200])
@@ -74,8 +64,9 @@ def hear_pgns(lines: Sequence[str], heard: Heard) -> None:
             "angles of NMEA 2000 are in rad: none of heading and course exceeds 2 pi"
         )
     for number, message in messages.items():
-        source = f"PGN {message.pgn} of {message.sender}"
-        if message.pgn == "127245" and _number(message.value("instance")) == 1.0:
+        pgn, _ = message["pgn"]
+        source = f"PGN {pgn} of {message['sender'][0]}"
+        if pgn == "127245" and _number(_value(message, "instance")) == 1.0:
             source = port_source(source)
         heard.hear(number, source, _channels(message, unit))
 
@@ -117,7 +108,12 @@ def _printed(line: str) -> _Message | None:
 def _message(pgn: Any, sender: Any, fields: Mapping[str, Any]) -> _Message:
     """A message with names of fields in lower case, without blanks."""
     plain = {name.replace(" ", "").lower(): field for name, field in fields.items()}
-    return _Message(str(pgn), str(sender), plain)
+    return plain | {"pgn": (str(pgn), ""), "sender": (str(sender), "")}
+
+
+def _value(message: _Message, name: str) -> Any:
+    """A field without its unit; None for none."""
+    return message.get(name, (None, ""))[0]
 
 
 def _number(text: Any) -> float | None:
@@ -134,7 +130,7 @@ def _angle_unit(messages: Iterable[_Message]) -> str:
     largest = 0.0
     for message in messages:
         for name in ("heading", "cog"):
-            value, unit = message.fields.get(name, (None, ""))
+            value, unit = message.get(name, (None, ""))
             if not unit:
                 largest = max(largest, _number(value) or 0.0)
     return "rad" if 0.0 < largest < 6.3 else "deg"
@@ -142,18 +138,18 @@ def _angle_unit(messages: Iterable[_Message]) -> str:
 
 def _channels(message: _Message, angle_unit: str) -> dict[str, float]:
     """Channels of a message, SI units; headings and winds by the reference it names."""
-    if message.value("cogreference") == "Magnetic":
+    if _value(message, "cogreference") == "Magnetic":
         return {}
     values = {}
-    for name, channel in _PGNS[message.pgn].items():
-        value, unit = message.fields.get(name, (None, ""))
+    for name, channel in _PGNS[_value(message, "pgn")].items():
+        value, unit = message.get(name, (None, ""))
         number = _number(value)
         if number is not None:
             is_speed = channel in ("sog", "stw", "speed")
             unit = unit or ("m/s" if is_speed else angle_unit)
             is_place = channel in ("lat", "lon")
             values[channel] = number * (1.0 if is_place else _FACTORS.get(unit, 1.0))
-    reference = message.value("reference")
+    reference = _value(message, "reference")
     deviation = values.pop("deviation", 0.0)
     if "heading" in values:
         heading = values.pop("heading")
