@@ -76,7 +76,8 @@ def _cg_to_midship(log: Log, xg: float) -> None:
         other, factor = moves[name]
         if other not in channels:
             log.needed(other, f'{name} of origin = "cg"')
-        channels[name] = channels[name] + xg * factor(channels[other])
+        arm = xg * factor(channels[other])
+        channels[name] = channels[name] + arm
 
 
 def _to_midship(
@@ -91,15 +92,18 @@ def _to_midship(
     """
     channels = log.channels
     is_elsewhere = not installation.is_at_midship
-    is_track_alone = log.has("x") and not log.has("psi") and not log.has("delta")
+    lacks_heading = not log.has("psi")
+    is_track_alone = lacks_heading and log.has("x") and not log.has("delta")
     if is_track_alone and not is_elsewhere:
         channels.pop("ground_north", None)
         channels.pop("ground_east", None)
-    elif (is_elsewhere or log.has("ground_north")) and not log.has("psi"):
+    elif lacks_heading and (is_elsewhere or log.has("ground_north")):
         log.needed("psi", "positions or velocities of GNSS")
     if is_elsewhere and log.has("x", "y"):
         north, east = rotate_to_body(
-            installation.forward, installation.starboard, -channels["psi"]
+            installation.forward,
+            installation.starboard,
+            -channels["psi"],
         )
         channels["x"] = channels["x"] - north
         channels["y"] = channels["y"] - east

@@ -149,8 +149,9 @@ class ShipFile:
                 trials = [trial_of(log, entry.file, **facts)]
             else:
                 trials = cut_trials(entry.cut, log, entry.file, entry.where, **facts)
+        where = f"{entry.where}: {entry.paths[0]}"
         for trial in trials:
-            check_scale(trial, self.particulars, f"{entry.where}: {entry.paths[0]}")
+            check_scale(trial, self.particulars, where)
         return trials
 
 

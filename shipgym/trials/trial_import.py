@@ -164,11 +164,12 @@ def _check_channels(
     has_positions = any("lat" in one.locator.columns for one in recordings)
     if has_positions or log.has("ground_north"):
         check_over_ground(log, conventions, locator)
-    if log.has("x", "y") or log.has("ground_north"):
-        for one in recordings:
+    tells_speed = log.has("x", "y") or log.has("ground_north")
+    tells_turning = log.has("psi") or log.has("r")
+    for one in recordings:
+        if tells_speed:
             check_speed_units(log, one.locator)
-    if log.has("psi") or log.has("r"):
-        for one in recordings:
+        if tells_turning:
             check_rudder_unit(log, one.locator)
     if log.has("psi", "r"):
         check_yaw_rate(log, locator)

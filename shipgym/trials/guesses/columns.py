@@ -176,8 +176,9 @@ def _first_match(
     of_unit = _column_names()["with_unit"].get(channel, [])
     for pattern in (*patterns, *of_unit):
         for guess in fitting:
-            is_known = pattern not in of_unit or guess.is_named
-            if is_known and _matches(_forms(guess.name, channel), [pattern]):
+            may_be = guess.is_named or pattern not in of_unit
+            forms = _forms(guess.name, channel)
+            if may_be and _matches(forms, [pattern]):
                 return guess
     return None
 
@@ -276,7 +277,9 @@ def _with_date(table: LogTable, time: ColumnGuess, free: list[str]) -> ColumnGue
     for pattern in _column_names()["known"]["date"]:
         for column in free:
             date = table.first_text(column)
-            if _DATE.fullmatch(date) and _matches(_forms(column, "t"), [pattern]):
+            forms = _forms(column, "t")
+            is_named = _matches(forms, [pattern])
+            if is_named and _DATE.fullmatch(date):
                 free.remove(column)
                 return replace(time, date=column)
     return time

@@ -117,10 +117,13 @@ class TrialGuess:
         if name not in QUANTITIES:
             self.conventions.append(ConventionGuess(name, value, reason))
         together = ("u", "v") if name == "u" else (name,)
-        for k, one in enumerate(self.columns):
+        columns = []
+        for one in self.columns:
             if one.channel in together:
                 because = f"by the check that refused {one.unit} ({one.reason})"
-                self.columns[k] = replace(one, unit=value, reason=because)
+                one = replace(one, unit=value, reason=because)
+            columns.append(one)
+        self.columns = columns
 
     def read(self) -> Trial:
         """Read the log with the guesses so far."""

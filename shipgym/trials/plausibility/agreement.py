@@ -20,22 +20,32 @@ def rate_gain(t: Floats, psi: Floats, r: Floats) -> float:
     The channels are in SI units, the heading without jumps.
     """
     turned = _without_trend(t, psi)
-    expected = _without_trend(t, integral(t, r))
-    if max(np.ptp(turned), np.ptp(expected)) < 2.0 * DEGREE:
+    swept = integral(t, r)
+    expected = _without_trend(t, swept)
+    largest = max(np.ptp(turned), np.ptp(expected))
+    if largest < 2.0 * DEGREE:
         return 1.0
-    known, sought = np.diff(expected), np.diff(turned)
-    gain = float(known @ sought) / max(float(known @ known), 1e-300)
-    unexplained = np.linalg.norm(sought - gain * known)
-    is_clear = unexplained < 0.5 * np.linalg.norm(sought)
-    return gain if is_clear and not 0.2 < gain < 5.0 else 1.0
+
+    known = np.diff(expected)
+    sought = np.diff(turned)
+    power = max(float(known @ known), 1e-300)
+    gain = float(known @ sought) / power
+    residual = sought - gain * known
+    whole = np.linalg.norm(sought)
+    is_clear = np.linalg.norm(residual) < 0.5 * whole
+    is_usual = 0.2 < gain < 5.0
+    return gain if is_clear and not is_usual else 1.0
 
 
 def _without_trend(t: Floats, values: Floats) -> Floats:
     """Values at the edges of windows without their line: a rate sensor has a bias."""
     edges = np.linspace(0, t.size - 1, num=31)
     rows = np.unique(np.rint(edges).astype(int))
-    time = (t[rows] - t[0]) / (t[-1] - t[0])
-    left: Floats = values[rows] - np.polyval(np.polyfit(time, values[rows], 1), time)
+    at_edges = values[rows]
+    passed = t[rows] - t[0]
+    time = passed / (t[-1] - t[0])
+    line = np.polyfit(time, at_edges, deg=1)
+    left: Floats = at_edges - np.polyval(line, time)
     return left
 
 
@@ -91,18 +101,23 @@ def check_velocity(log: Log, frame: str, locator: Locator) -> None:
     The channels are in SI units, the heading without jumps; `frame`, "body" or "earth",
     is the declared one of u and v.
     """
-    velocity = log.channels["u"] + 1j * log.channels["v"]
-    heading = np.exp(1j * log.channels["psi"])
-    position = log.channels["x"] + 1j * log.channels["y"]
+    channels = log.channels
+    velocity = channels["u"] + 1j * channels["v"]
+    heading = np.exp(1j * channels["psi"])
+    position = channels["x"] + 1j * channels["y"]
+    over_ground = {"body": velocity * heading, "earth": velocity}
     misfits = {}
-    for name, over_ground in (("body", velocity * heading), ("earth", velocity)):
-        sailed = integral(log.t, over_ground)
+    for name, one in over_ground.items():
+        sailed = integral(log.t, one)
         _, moved, expected = changes(log.t, 10.0, position, sailed)
         misfits[name] = np.linalg.norm(moved - expected)
+
     declared = misfits.pop(frame)
     ((other, misfit),) = misfits.items()
-    if declared > max(0.2 * np.linalg.norm(moved), 5.0 * misfit):
-        u, v = (locator.columns[one].name for one in "uv")
+    usual = 0.2 * np.linalg.norm(moved)
+    if declared > max(usual, 5.0 * misfit):
+        u = locator.columns["u"].name
+        v = locator.columns["v"].name
         raise InputError(
             f"{locator.path}: expected columns '{u}' and '{v}' to follow the positions"
             f" as velocities in the {frame} frame (velocity_frame"

@@ -45,12 +45,13 @@ def check_over_ground(log: Log, conventions: Conventions, locator: Locator) -> N
     is_known = bool(conventions.installation.heading_offset)
     psi = log.channels["psi"][moving]
     course = np.angle(velocity[moving])
-    apart = course - psi
-    agreement = abs(np.exp(1j * apart).mean())
-    sum_of_both = course + psi
-    mirrored = np.exp(1j * sum_of_both).mean()
+    apart = np.exp(1j * (course - psi))
+    agreement = abs(apart.mean())
+    both = np.exp(1j * (course + psi))
+    mirrored = both.mean()
     is_turning = np.ptp(psi) > 20.0 * DEGREE
-    if is_turning and abs(mirrored) > max(0.95, agreement + 0.02):
+    limit = max(0.95, agreement + 0.02)
+    if is_turning and abs(mirrored) > limit:
         raise _mirrored(mirrored, conventions, locator)
     fault = _heading_fault(psi, course, offset_is_known=is_known)
     if fault:
@@ -66,14 +67,17 @@ def check_speed_units(log: Log, locator: Locator) -> None:
     over_ground = _usual_speed(log)
     if over_ground < _SLOWEST:
         return
-    speeds = _speeds(log)
-    for channel in speeds.keys() & locator.columns.keys():
-        ratio = over_ground / max(speeds[channel], 1e-9)
+    for channel, speed in _speeds(log).items():
+        if channel not in locator.columns:
+            continue
+        ratio = over_ground / max(speed, 1e-9)
         column = locator.columns[channel]
         is_guess = isinstance(column, ColumnGuess) and not column.is_named
-        unit = _unit_instead(ratio, column.unit, 0.3 if is_guess else 0.16)
-        is_usual = 0.6 < ratio < 1.67 and not is_guess
-        if is_usual or unit in ("", column.unit):
+        largest = 0.3 if is_guess else 0.16
+        unit = _unit_instead(ratio, column.unit, largest)
+        is_usual = not is_guess and 0.6 < ratio < 1.67
+        is_own = unit == column.unit
+        if is_usual or is_own or not unit:
             continue
         raise InputError(
             f"{locator.path}: expected column '{column.name}' to agree with the speed"
@@ -98,7 +102,9 @@ def _unit_instead(ratio: float, declared: str, apart_at_most: float) -> str:
     """Unit of a speed that is wrong by a ratio; empty where none fits."""
     factors = UNITS["speed"]
     sought = ratio * factors[declared]
-    apart = {unit: abs(math.log(one / sought)) for unit, one in factors.items()}
+    apart = {}
+    for unit, factor in factors.items():
+        apart[unit] = abs(math.log(factor / sought))
     nearest = min(apart, key=lambda unit: apart[unit])
     return nearest if apart[nearest] < apart_at_most else ""
 

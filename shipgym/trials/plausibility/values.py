@@ -182,12 +182,16 @@ def frozen_heading(log: Log) -> list[str]:
     """
     if not log.has("psi", "delta"):
         return []
-    is_over = np.abs(log.channels["delta"]) > 5.0 * DEGREE
-    stands = np.abs(np.diff(log.channels["psi"])) < 1e-9
-    moves = np.flatnonzero(~(stands & is_over[1:]))
-    stretches = np.split(log.t, moves + 1)
+    psi = log.channels["psi"]
+    delta = log.channels["delta"]
+    is_over = np.abs(delta) > 5.0 * DEGREE
+    stands = np.abs(np.diff(psi)) < 1e-9
+    is_frozen = stands & is_over[1:]
+    ends = np.flatnonzero(~is_frozen)
+    stretches = np.split(log.t, ends + 1)
     longest = max(stretches, key=np.ptp)
-    if longest.size <= 10 or np.ptp(longest) < 10.0:
+    lasted = np.ptp(longest)
+    if longest.size <= 10 or lasted < 10.0:
         return []
     return [
         f"the heading stands still from {longest[0]:g} to {longest[-1]:g} s while the"

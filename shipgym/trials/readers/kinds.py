@@ -42,7 +42,9 @@ def recognise_kind(path: Path, content: bytes) -> str:
         if content.startswith(magic):
             return kind
     beginning = content[:4096].decode("latin-1").replace("\r", "\n")
-    if len([*_MESSAGES.findall(beginning), *RAW_FRAME.findall(beginning)]) >= 2:
+    sentences = _MESSAGES.findall(beginning)
+    frames = RAW_FRAME.findall(beginning)
+    if len(sentences) + len(frames) >= 2:
         return "messages"
     _refuse_foreign(path, content)
     return "csv"

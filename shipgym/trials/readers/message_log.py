@@ -216,15 +216,16 @@ def read_messages(path: Path, content: bytes) -> LogTable:
 
 def _check_damage(path: Path, heard: Heard) -> list[str]:
     """Refuse a log of many damaged messages; a note of few."""
-    damaged = f"{len(heard.damaged)} of {heard.count}"
-    if len(heard.damaged) > 0.1 * heard.count:
+    number = len(heard.damaged)
+    damaged = f"{number} of {heard.count}"
+    if number > 0.1 * heard.count:
         raise InputError(
             f"{path}: line {heard.damaged[0]}: expected hardly any damaged sentences,"
             f" got {damaged} with a wrong or no checksum or broken fields, this the"
             " first; the log was damaged on the way: take the original"
         )
     note = f"{damaged} sentences with a wrong checksum or broken fields left out"
-    return [note] if heard.damaged else []
+    return [note] if number else []
 
 
 def _table(

@@ -131,8 +131,9 @@ def _angle_unit(messages: Iterable[_Message]) -> str:
     for message in messages:
         for name in ("heading", "cog"):
             value, unit = message.get(name, (None, ""))
-            if not unit:
-                largest = max(largest, _number(value) or 0.0)
+            angle = _number(value)
+            if angle is not None and not unit:
+                largest = max(largest, angle)
     return "rad" if 0.0 < largest < 6.3 else "deg"
 
 

@@ -24,7 +24,8 @@ def text_lines(path: Path, content: bytes) -> list[str]:
 
     Raises InputError for more, and with the line for bytes that are no text.
     """
-    lines = re.split(r"\r\n|\r|\n", _decode(path, content))
+    text = _decode(path, content)
+    lines = re.split(r"\r\n|\r|\n", text)
     most = 1_000_000
     if len(lines) > most:
         raise InputError(
