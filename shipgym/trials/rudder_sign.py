@@ -181,12 +181,9 @@ def _fit(t: Floats, psi: Floats, delta: Floats, damping: float) -> _Fit:
 
 def _response(t: Floats, values: Floats, damping: float) -> Floats:
     """Heading of a ship with r' = -damping r + values from rest, by trapezoids."""
-    steps = np.diff(t, axis=1)
-    grown = np.exp(damping * t[:, 1:])
-    means = 0.5 * (values[:, :-1] + values[:, 1:])
-    r = np.zeros_like(t)
-    gains = means * -np.expm1(-damping * steps) / damping
-    r[:, 1:] = np.cumsum(gains * grown, axis=1) / grown
-    psi = np.zeros_like(t)
-    psi[:, 1:] = np.cumsum(steps * 0.5 * (r[:, :-1] + r[:, 1:]), axis=1)
+    from scipy.integrate import cumulative_trapezoid
+
+    grown = np.exp(damping * t)
+    impulse = cumulative_trapezoid(values * grown, t, initial=0.0)
+    psi: Floats = cumulative_trapezoid(impulse / grown, t, initial=0.0)
     return psi

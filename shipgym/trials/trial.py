@@ -52,7 +52,7 @@ KINDS = (
     "random",
 )
 
-_RUDDERS = ("delta", "delta_command")
+_RUDDERS = {"delta", "delta_command"}
 
 #: What a trial is used for.
 USES = ("fit", "validate", "skip")
@@ -424,14 +424,15 @@ def _check_time(
 
 def _check_angles(t: Floats, channels: Mapping[str, Floats], where: str) -> None:
     """Refuse arrays of a rudder, heading or yaw rate in degrees."""
-    wrong = {name: np.abs(channels.get(name, 0.0)).max() for name in _RUDDERS}
-    for name, largest in wrong.items():
-        if largest > (1.0 + 1e-9) * LARGEST_MAGNITUDES[name]:
-            k = int(np.argmax(np.abs(channels[name])))
-            raise _in_degrees(where, name, f" ({channels[name][k]:g} in sample {k})")
+    for name in channels.keys() & _RUDDERS:
+        values = channels[name]
+        k = int(np.argmax(np.abs(values)))
+        if abs(values[k]) > (1.0 + 1e-9) * LARGEST_MAGNITUDES[name]:
+            raise _in_degrees(where, name, f" ({values[k]:g} in sample {k})")
     if {"psi", "r"} <= channels.keys():
-        gain = abs(rate_gain(t, channels["psi"], channels["r"])) * DEGREE
-        for name, factor in (("psi", gain), ("r", DEGREE**2 / max(gain, 1e-9))):
+        gain = abs(rate_gain(t, channels["psi"], channels["r"]))
+        in_degrees = {"psi": gain * DEGREE, "r": gain / DEGREE}
+        for name, factor in in_degrees.items():
             if 0.5 < factor < 2.0:
                 raise _in_degrees(where, name, ", by psi and r together")
 

@@ -3,15 +3,13 @@
 They are compared over windows in time, so that noise and offsets do not matter.
 """
 
-import math
-
 import numpy as np
 
 from shipgym.arrays import Floats, integral
 from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
 from shipgym.trials.resampling import Log, changes, usual_step
-from shipgym.trials.units import DEGREE, QUANTITIES, UNITS
+from shipgym.trials.units import DEGREE, QUANTITIES, UNITS, si_factor
 
 
 def rate_gain(t: Floats, psi: Floats, r: Floats) -> float:
@@ -62,7 +60,8 @@ def check_yaw_rate(log: Log, locator: Locator) -> None:
         )
     if gain != 1.0:
         proposals = _nearest_units(gain, locator)
-        alternatives = " or ".join(locator.declaration(*one) for one in proposals)
+        declarations = [locator.declaration(*one) for one in proposals]
+        alternatives = " or ".join(declarations) or "the unit of each"
         raise InputError(
             f"{expected} (yaw rate) to agree, got a heading that changes {gain:.3g}"
             " times as fast as the yaw rate says; likely a wrong unit, declare"
@@ -73,14 +72,14 @@ def check_yaw_rate(log: Log, locator: Locator) -> None:
 
 def _nearest_units(gain: float, locator: Locator) -> list[tuple[str, str]]:
     """Units of which one would bring heading and yaw rate together, by channel."""
-    distances = {}  # of the gains that are left with a unit
+    fitting = []
     for channel, power in (("psi", 1.0), ("r", -1.0)):
-        factors = UNITS[QUANTITIES[channel]]
-        own = factors[locator.columns[channel].unit]
-        for unit, factor in factors.items():
-            distances[channel, unit] = abs(math.log(gain * (factor / own) ** power))
-    nearest = min(distances.values())
-    return [one for one, distance in distances.items() if distance < nearest + 0.01]
+        own = si_factor(channel, locator.columns[channel].unit)
+        for unit, factor in UNITS[QUANTITIES[channel]].items():
+            left = gain * (factor / own) ** power
+            if 0.5 < left < 2.0:
+                fitting.append((channel, unit))
+    return fitting
 
 
 def check_steps(t: Floats, locator: Locator) -> list[str]:
