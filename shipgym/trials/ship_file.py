@@ -8,7 +8,7 @@ from typing import Any, Self
 
 from shipgym.checks import check_choice, check_keys, check_table, data_only, placed
 from shipgym.errors import InputError
-from shipgym.files import LARGEST_TOML, expecting, parse_toml, read_text, read_toml
+from shipgym.files import LARGEST_TOML, expecting, parse_toml, read_text
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import own_structure
@@ -186,8 +186,9 @@ def _read_decided(path: Path) -> tuple[str, tuple[str, ...]]:
     A message names the line of the file and, from its comment, the choices.
     """
     with expecting("ship file", path):
-        read_toml(path, "ship file")
-        lines = read_text(path, "ship file", LARGEST_TOML).splitlines()
+        text = read_text(path, "ship file (TOML)", LARGEST_TOML)
+        parse_toml(text, f"{path}:")
+    lines = text.splitlines()
     messages = []
     for number, line in enumerate(lines, start=1):
         match = _LINE.fullmatch(line)

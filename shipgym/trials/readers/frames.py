@@ -66,9 +66,8 @@ def read_parquet(path: Path, content: bytes) -> LogTable:
     Raises InputError for a damaged one, or one that unpacks to too much.
     """
     with damage_reported(path, "Parquet", "it may be cut short: write it again"):
-        arrow = import_module("pyarrow")
         parquet = import_module("pyarrow.parquet")
-        source = arrow.BufferReader(content)
+        source = io.BytesIO(content)
         metadata = parquet.read_metadata(source)
         groups = [metadata.row_group(k) for k in range(metadata.num_row_groups)]
         as_numbers = 8 * metadata.num_rows * metadata.num_columns

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from pynmea2 import NMEASentence
 
 from shipgym.files import shipped_toml
-from shipgym.trials.readers.messages import Heard, Value, port_source
+from shipgym.trials.readers.messages import Heard, port_source
 from shipgym.trials.units import DEGREE, UNITS
 
 _FACTORS = {**UNITS["angle"], **UNITS["angular rate"], **UNITS["speed"]}
@@ -113,8 +113,7 @@ def hear_sentences(lines: Sequence[str], heard: Heard) -> None:
         port = numbers.pop("port", None)
         heard.hear(one.line, one.source, numbers, time)
         if port is not None:
-            second = heard.channels["delta"][port_source(one.source)]
-            second.append(Value(one.line, time, port))
+            heard.hear(one.line, port_source(one.source), {"delta": port}, time)
         lacking += not one.checksum
         if (numbers or port is not None) and _lacks_status(kind, fields):
             without_status.append(one.source)
