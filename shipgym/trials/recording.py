@@ -87,11 +87,13 @@ def read_recording(
         )
     if repair is not None:
         names = [column.name for column in chosen.values()]
-        table = table.without_odd_cells(names, chosen["t"].name)
+        time = chosen["t"].name
+        table = table.without_odd_cells(names, time)
     notes = [*table.notes, *_settle_speed(chosen)]
     times = read_times(table, chosen["t"])
     chosen["t"] = replace(chosen["t"], unit=times.unit)
-    locator = Locator(table, chosen, rows=np.arange(times.t.size))
+    every = np.arange(times.t.size)
+    locator = Locator(table, chosen, rows=every)
     notes += times.notes
     channels = _read_numbers(locator, notes)
     outliers = 0

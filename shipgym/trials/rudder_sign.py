@@ -185,5 +185,6 @@ def _response(t: Floats, values: Floats, damping: float) -> Floats:
 
     grown = np.exp(damping * t)
     impulse = cumulative_trapezoid(values * grown, t, initial=0.0)
-    psi: Floats = cumulative_trapezoid(impulse / grown, t, initial=0.0)
+    r = impulse / grown
+    psi: Floats = cumulative_trapezoid(r, t, initial=0.0)
     return psi

@@ -101,9 +101,3 @@ def spelled_units(text: str) -> list[str]:
         if any(fnmatchcase(text, spelling) for spelling in spellings):
             units.append(unit)
     return units
-
-
-def unit_of_channel(units: list[str], channel: str) -> str | None:
-    """The first of some units that is one of a channel; None if there is none."""
-    of_channel = UNITS[QUANTITIES[channel]]
-    return next((unit for unit in units if unit in of_channel), None)

@@ -18,7 +18,6 @@ from shipgym.trials.guesses.units import (
     UNKNOWN,
     UnitGuess,
     named_unit,
-    names_another_quantity,
     unit_by_size,
     unknown_unit,
 )
@@ -112,15 +111,20 @@ def guess_columns(table: LogTable) -> list[ColumnGuess]:
         take(alone, "speed")
     if "t" in guesses:
         guesses["t"] = _with_date(table, guesses["t"], free)
-    if guesses.keys().isdisjoint(("lat", "x")):
-        _guess_speeds(table, guesses)
+    _guess_speeds(table, guesses)
     return [guesses[channel] for channel in known if channel in guesses]
 
 
 def _guess_speeds(table: LogTable, guesses: dict[str, ColumnGuess]) -> None:
-    """Take the usual unit of speeds that neither a name nor positions tell."""
+    """Take the usual unit of speeds that neither a name nor positions tell.
+
+    A speed over ground without its course is not compared with positions.
+    """
+    channels = ["sog", "stw", "u", "v"]
+    if not guesses.keys().isdisjoint(("lat", "x")):
+        channels = [] if "cog" in guesses else ["sog"]
     unknown = {}
-    for channel in ("sog", "stw", "u", "v"):
+    for channel in channels:
         guess = guesses.get(channel)
         if guess is not None and guess.reason.startswith(BY_SIZE):
             unknown[channel] = table.likely_numbers(guess.name)
@@ -130,8 +134,8 @@ def _guess_speeds(table: LogTable, guesses: dict[str, ColumnGuess]) -> None:
     fastest = 15.0 if is_si else 3.0  # that is likelier in m/s
     beside = ", with angles in rad" if is_si else ""
     reason = (
-        f"is a guess: there are no positions that tell, up to {largest:.4g}{beside};"
-        " knots, m/s or km/h"
+        f"is a guess: no positions tell, up to {largest:.4g}{beside}; knots, m/s or"
+        " km/h"
     )
     unit = "m/s" if largest <= fastest else "knots"
     for channel in unknown:
@@ -173,7 +177,8 @@ def _first_match(
         if unit is not None and _may_be(table, column, channel):
             fitting.append(ColumnGuess(column, channel=channel, **unit._asdict()))
     fitting.sort(key=lambda one: one.unit == UNKNOWN)
-    of_unit = _column_names()["with_unit"].get(channel, [])
+    only_with_unit = _column_names()["with_unit"]
+    of_unit = only_with_unit.get(channel, [])
     for pattern in (*patterns, *of_unit):
         for guess in fitting:
             may_be = guess.is_named or pattern not in of_unit
@@ -194,9 +199,11 @@ def _unit_where_fitting(table: LogTable, column: str, channel: str) -> UnitGuess
         (f"x [{_spaced(table.unit_row.get(column, ''))}]", "from the row of units"),
     ):
         units = split_unit(text).units
-        if names_another_quantity(units, channel):
+        named = named_unit(units, channel, reason)
+        # a single letter may be no unit, as in "Heading M"
+        if named is None and any(len(one) > 1 for one in units):
             return None
-        unit = named_unit(units, channel, reason) or unit
+        unit = named or unit
         unknown = unknown or unknown_unit(text)
     if unit is None and unknown is not None:
         return UnitGuess(UNKNOWN, f"'{unknown}' is not known")

@@ -71,29 +71,27 @@ def _side(column: str) -> tuple[str, str]:
     """Side that a column's name tells, empty without one, and the rest of the name."""
     apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", column)
     words = re.findall(r"[^\W_]+", apart.lower())
-    for number, word in enumerate(words):
-        if word in _PORT or word in _STARBOARD:
-            rest = " ".join(words[:number] + words[number + 1 :])
-            return "port" if word in _PORT else "starboard", rest or "n"
+    for side, known in (("port", _PORT), ("starboard", _STARBOARD)):
+        rest = [word for word in words if word not in known]
+        if len(rest) < len(words):
+            return side, " ".join(rest) or "n"
     return "", ""
 
 
 def _servo(numbers: dict[str, Floats]) -> ColumnGuess | None:
-    """The first pulse width that a servo of radio control gets.
-
-    ArduPilot's ``SteerOut`` is a command up to 4500.
-    """
-    for column in numbers:
-        if re.fullmatch(r"(.*\.)?SteerOut", column):
-            reason = "steering command of ArduPilot, of which 4500 is the full one"
-            return _command(column, reason, full=4500.0)
+    """The first command of ArduPilot, or pulse width that a servo gets."""
     for column, values in numbers.items():
+        neutral, full = 0.0, 4500.0
+        is_command = re.fullmatch(r"(.*\.)?SteerOut", column) is not None
         if _SERVO.fullmatch(column) and _is_pulse_width(values):
+            is_command = True
+            neutral, full = _NEUTRAL, _SPAN
+        if is_command:
             reason = (
-                f"steering command: a pulse width in us, neutral at {_NEUTRAL:g}, of"
-                f" which {_SPAN:g} counts as 35 deg of a nominal rudder"
+                f"steering command: neutral at {neutral:g}, of which {full:g} counts as"
+                " 35 deg of a nominal rudder"
             )
-            return _command(column, reason, neutral=_NEUTRAL, full=_SPAN)
+            return _command(column, reason, neutral=neutral, full=full)
     return None
 
 

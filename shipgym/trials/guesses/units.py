@@ -12,7 +12,6 @@ from shipgym.trials.units import (
     UNITS,
     si_unit,
     spelled_units,
-    unit_of_channel,
 )
 
 #: Size from which on a channel or quantity is not in SI units, and the unit that it has
@@ -61,10 +60,9 @@ def named_unit(
     units: list[str], channel: str, reason: str = "from its name"
 ) -> UnitGuess | None:
     """Unit of a channel among those with which a name ends; None if there is none."""
-    unit = unit_of_channel(units, channel)
-    if unit is None:
-        return None
-    return UnitGuess(unit, reason)
+    of_channel = UNITS[QUANTITIES[channel]]
+    fitting = (UnitGuess(unit, reason) for unit in units if unit in of_channel)
+    return next(fitting, None)
 
 
 def unknown_unit(name: str) -> str | None:
@@ -75,16 +73,6 @@ def unknown_unit(name: str) -> str | None:
     is_unit = _FOREIGN.fullmatch(match[2]) is not None
     is_square = match[1] == "[" and not _QUALIFIERS.fullmatch(match[2])
     return match[2] if is_unit or is_square else None
-
-
-def names_another_quantity(units: list[str], channel: str) -> bool:
-    """Return whether a name ends with a unit of another quantity.
-
-    A single letter may be no unit, as in "Heading M".
-    """
-    if unit_of_channel(units, channel) is not None:
-        return False
-    return any(len(unit) > 1 for unit in units)
 
 
 def unit_by_size(values: Floats | None, channel: str) -> UnitGuess:

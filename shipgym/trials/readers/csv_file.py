@@ -54,7 +54,7 @@ def read_csv(path: Path, content: bytes) -> LogTable:
     while len(header) > 2 and not header[-1]:
         header.pop()
     notes: list[str] = []
-    titles = sum(number < layout.header for number in filled)
+    titles = filled.index(layout.header)
     if titles:
         notes.append(
             f"the names of the columns are in line {layout.header + 1}: {titles} lines"

@@ -27,9 +27,10 @@ def text_lines(path: Path, content: bytes) -> list[str]:
     text = _decode(path, content)
     lines = re.split(r"\r\n|\r|\n", text)
     most = 1_000_000
-    if len(lines) > most:
+    count = len(lines)
+    if count > most:
         raise InputError(
-            f"{path}: expected at most {most} lines, got {len(lines)}; split the file"
+            f"{path}: expected at most {most} lines, got {count}; split the file"
         )
     return lines
 
