@@ -184,7 +184,7 @@ def _response(t: Floats, values: Floats, damping: float) -> Floats:
     from scipy.integrate import cumulative_trapezoid
 
     grown = np.exp(damping * t)
-    impulse = cumulative_trapezoid(values * grown, t, initial=0.0)
+    impulse = cumulative_trapezoid(values * grown, t, initial=0)
     r = impulse / grown
-    psi: Floats = cumulative_trapezoid(r, t, initial=0.0)
+    psi: Floats = cumulative_trapezoid(r, t, initial=0)
     return psi
