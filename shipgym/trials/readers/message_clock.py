@@ -36,15 +36,16 @@ def log_clock(path: Path, heard: Heard, notes: list[str]) -> Clock | None:
     if own is not None and clock is not own:
         ahead = _ahead(clock, heard.times[own.source])
         least, middle, most = np.quantile(ahead, [0.1, 0.5, 0.9]).tolist()
+        words = ""
         if most - least > 2.0:
-            words = "do not run with those of {source}: left out"
+            words = f"do not run with those of {own.source}: left out"
             clock = own
-        else:
-            words = f"are {middle:.6g} s ahead of those of {{source}}, which are taken"
-            if abs(middle) > 1.0:  # a message takes part of a second
-                clock = clock._replace(t=clock.t - middle)
-        if clock is own or (abs(middle) > 1.0 and is_dated(own.t[0])):
-            words = words.format(source=own.source)
+        elif abs(middle) > 1.0:  # a message takes part of a second
+            words = (
+                f"are {middle:.6g} s ahead of those of {own.source}, which are taken"
+            )
+            clock = clock._replace(t=clock.t - middle)
+        if words:
             notes.append(f"the times before the lines {words}")
     return _with_bursts(clock, sorted(heard.order))
 
@@ -53,10 +54,12 @@ def _own_clock(path: Path, times: BySource) -> Clock | None:
     """Times of the source that gives a date, of those the busiest one."""
     if not times:
         return None
-    moments = {source: {one.time for one in values} for source, values in times.items()}
-    best = max(
-        sorted(times), key=lambda one: (is_dated(min(moments[one])), len(moments[one]))
-    )
+
+    def rank(source: str) -> tuple[bool, int]:
+        moments = {one.time for one in times[source]}
+        return is_dated(min(moments)), len(moments)
+
+    best = max(sorted(times), key=rank)
     lines, t, _ = np.array(times[best]).T
     if not is_dated(t[0]):
         t = np.unwrap(t, period=DAY)
