@@ -11,11 +11,12 @@ from shipgym.trials.columns import Column
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.midship import to_project_conventions
 from shipgym.trials.plausibility.agreement import (
+    check_over_ground,
+    check_speed_units,
     check_steps,
     check_velocity,
     check_yaw_rate,
 )
-from shipgym.trials.plausibility.over_ground import check_over_ground, check_speed_units
 from shipgym.trials.plausibility.values import check_rudder_unit, frozen_heading
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.recording import Recording, read_recording

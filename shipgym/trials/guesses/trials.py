@@ -14,8 +14,12 @@ from shipgym.checks import quoted, shown
 from shipgym.errors import InputError
 from shipgym.trials.columns import ColumnGuess
 from shipgym.trials.conventions import Conventions
-from shipgym.trials.guesses.columns import RUDDERS, guess_columns
-from shipgym.trials.guesses.units import UNKNOWN, unit_by_size
+from shipgym.trials.guesses.columns import (
+    RUDDERS,
+    UNKNOWN,
+    guess_columns,
+    unit_by_size,
+)
 from shipgym.trials.readers.cell_texts import number_with_side
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable

@@ -1,13 +1,18 @@
-"""Channels that contradict each other: heading and yaw rate, positions and velocities.
+"""Channels that contradict each other: heading, yaw rate, positions, velocities.
 
 They are compared over windows in time, so that noise and offsets do not matter.
 """
 
+import math
+
 import numpy as np
+import numpy.typing as npt
 
 from shipgym.arrays import Floats, integral
 from shipgym.errors import InputError
-from shipgym.trials.columns import Locator
+from shipgym.trials.columns import ColumnGuess, Locator
+from shipgym.trials.conventions import Conventions
+from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.resampling import Log, changes, usual_step
 from shipgym.trials.units import DEGREE, QUANTITIES, UNITS, si_factor
 
@@ -124,3 +129,173 @@ def check_velocity(log: Log, frame: str, locator: Locator) -> None:
             f' velocity_frame = "{other}"',
             [("velocity_frame", other)],
         )
+
+
+_SLOWEST = 0.3  # m/s over ground, of any manoeuvre
+
+
+def _velocity_over_ground(log: Log) -> npt.NDArray[np.complex128]:
+    """North + i east velocity, m/s, by speed and course over ground or positions."""
+    channels = log.channels
+    if "ground_north" in channels:
+        return channels["ground_north"] + 1j * channels["ground_east"]
+    north, east = (time_derivative(log.t, channels[name]) for name in "xy")
+    return north + 1j * east
+
+
+def check_over_ground(log: Log, conventions: Conventions, locator: Locator) -> None:
+    """Refuse a ship at berth, and a heading that contradicts the course over ground.
+
+    The channels are as logged, in SI units, the heading without jumps.
+    """
+    velocity = _velocity_over_ground(log)
+    speed = np.abs(velocity)
+    fastest = np.quantile(speed, 0.95)
+    if fastest < _SLOWEST:
+        raise InputError(
+            f"{locator.path}: expected a manoeuvre, got a ship that makes at most"
+            f" {fastest:.2g} m/s over ground: she is at berth or at anchor; read"
+            " another log"
+        )
+    moving = speed > 0.3 * fastest  # a slow ship has no course
+    if "psi" not in log.channels or np.count_nonzero(moving) < 3:
+        return
+    is_known = bool(conventions.installation.heading_offset)
+    psi = log.channels["psi"][moving]
+    course = np.angle(velocity[moving])
+    apart = np.exp(1j * (course - psi))
+    agreement = abs(apart.mean())
+    both = np.exp(1j * (course + psi))
+    mirrored = both.mean()
+    is_turning = np.ptp(psi) > 20.0 * DEGREE
+    limit = max(0.95, agreement + 0.02)
+    if is_turning and abs(mirrored) > limit:
+        raise _mirrored(mirrored, conventions, locator)
+    fault = _heading_fault(psi, course, offset_is_known=is_known)
+    if fault:
+        raise InputError(f"{locator.path}: expected a heading {fault}")
+
+
+def check_speed_units(log: Log, locator: Locator) -> None:
+    """Refuse a speed that is to the one over ground as one unit is to another.
+
+    No current changes the speed of a ship by so much; of a unit that was guessed the
+    nearest one is right. The channels are in SI units.
+    """
+    over_ground = _usual_speed(log)
+    if over_ground < _SLOWEST:
+        return
+    for channel, speed in _speeds(log).items():
+        if channel not in locator.columns:
+            continue
+        ratio = over_ground / max(speed, 1e-9)
+        column = locator.columns[channel]
+        is_guess = isinstance(column, ColumnGuess) and not column.is_named
+        largest = 0.3 if is_guess else 0.16
+        unit = _unit_instead(ratio, column.unit, largest)
+        is_usual = not is_guess and 0.6 < ratio < 1.67
+        is_own = unit == column.unit
+        if is_usual or is_own or not unit:
+            continue
+        raise InputError(
+            f"{locator.path}: expected column '{column.name}' to agree with the speed"
+            f" over ground, got {ratio:.3g} times as much over ground, which no current"
+            f" does; likely a wrong unit, declare {locator.declaration(channel, unit)}",
+            [(channel, unit)],
+        )
+
+
+def _speeds(log: Log) -> dict[str, float]:
+    """Median size of the speeds to compare with that over ground, m/s."""
+    channels = log.channels
+    speeds = {"stw": channels["stw"]} if log.has("stw") else {}
+    if log.has("x", "ground_north"):
+        speeds["sog"] = np.hypot(channels["ground_north"], channels["ground_east"])
+    if log.has("u"):
+        speeds["u"] = np.hypot(channels["u"], channels.get("v", 0.0))
+    return {name: float(np.median(np.abs(one))) for name, one in speeds.items()}
+
+
+def _unit_instead(ratio: float, declared: str, apart_at_most: float) -> str:
+    """Unit of a speed that is wrong by a ratio; empty where none fits."""
+    factors = UNITS["speed"]
+    sought = ratio * factors[declared]
+    apart = {}
+    for unit, factor in factors.items():
+        apart[unit] = abs(math.log(factor / sought))
+    nearest = min(apart, key=lambda unit: apart[unit])
+    return nearest if apart[nearest] < apart_at_most else ""
+
+
+def _usual_speed(log: Log) -> float:
+    """Median speed over ground, m/s, by positions some seconds apart if there are."""
+    if not log.has("x"):
+        speeds = np.abs(_velocity_over_ground(log))
+        return float(np.median(speeds))
+    passed, north, east = changes(log.t, 5.0, log.channels["x"], log.channels["y"])
+    speeds = np.hypot(north, east) / passed
+    return float(np.median(speeds))
+
+
+def _mirrored(
+    mirrored: complex, conventions: Conventions, locator: Locator
+) -> InputError:
+    """Fault of a heading that turns against the course, about north-east or else."""
+    largest_drift = 0.4  # rad
+    remedy = "change the sign of its column"
+    proposals = []
+    if abs(np.angle(mirrored * -1j)) <= largest_drift:
+        frame = "ned" if conventions.frame == "enu" else "enu"
+        proposals = [("frame", frame)]
+        remedy = f'write frame = "{frame}" in [conventions], the frame of its angles'
+    return InputError(
+        f"{locator.path}: expected a heading clockwise from north, got one that"
+        f" contradicts the course over ground: it turns the other way; {remedy}",
+        proposals,
+    )
+
+
+def _heading_fault(psi: Floats, course: Floats, *, offset_is_known: bool) -> str:
+    """Words for a heading that copies or is far from the course over ground.
+
+    Both are in rad, of shape (n_samples,). Empty for a sound one.
+    """
+    apart = np.exp(1j * (course - psi))
+    mean = apart.mean()
+    turned_deg = math.degrees(np.ptp(psi))
+    if turned_deg > 20.0 and np.sqrt(np.mean(np.degrees(np.angle(apart)) ** 2)) < 0.3:
+        return (
+            "that differs from the course over ground where a ship drifts, got less"
+            f" than 0.3 deg of difference in a turn of {turned_deg:.0f} deg; name the"
+            ' gyro\'s column: psi = { column = "..." }'
+        )
+    if offset_is_known:
+        return ""
+    offset = _constant_offset(psi, np.angle(mean) + np.angle(apart / mean))
+    largest_deg = 25.0
+    if offset is None:
+        offset = -float(np.angle(mean))
+        largest_deg = 60.0  # to which ships may drift in a turn
+    offset_deg = math.degrees(offset)
+    if abs(offset_deg) <= largest_deg or abs(mean) <= 0.7:
+        return ""
+    return (
+        "clockwise from north, got one that contradicts the course over ground by"
+        f" {offset_deg:.0f} deg; name the right column, or write heading_offset_deg ="
+        f" {offset_deg:.0f} in [sensors]"
+    )
+
+
+def _constant_offset(psi: Floats, drift: Floats) -> float | None:
+    """Part of the heading's difference from the course that does not turn, rad.
+
+    A ship drifts outwards in a turn, and an antenna aft of midship more so: what she
+    shows on straight parts is the heading's. None where she turns all the time. `drift`
+    is the course over ground less the heading, without jumps.
+    """
+    turning = np.abs(np.gradient(psi))
+    fastest = np.quantile(turning, 0.95)
+    is_straight = turning <= 0.2 * fastest
+    if is_straight.mean() <= 0.1:
+        return None
+    return -float(np.median(drift[is_straight]))

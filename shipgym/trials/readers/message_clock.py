@@ -1,6 +1,8 @@
 """The clock of a log of messages: what satellites say, and stamps before the lines."""
 
 from collections import Counter, defaultdict
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -8,9 +10,16 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
-from shipgym.trials.clock_texts import DAY, clock_text, is_dated, spread_evenly
-from shipgym.trials.readers.line_stamps import read_stamps
+from shipgym.trials.clock_texts import (
+    DAY,
+    clock_text,
+    is_dated,
+    read_clock,
+    spread_evenly,
+    unit_since_1970,
+)
 from shipgym.trials.readers.messages import BySource, Heard, Value
+from shipgym.trials.units import UNITS
 
 
 class Clock(NamedTuple):
@@ -80,7 +89,7 @@ def _stamp_clock(heard: Heard) -> Clock | None:
     if len(heard.stamps) < 0.5 * heard.count:
         return None
     numbers, texts = zip(*sorted(heard.stamps.items()), strict=True)
-    t = read_stamps(texts)
+    t = _read_stamps(texts)
     is_known = np.isfinite(t)
     lines = np.array(numbers, dtype=np.float64)[is_known]
     t = t[is_known]
@@ -88,6 +97,26 @@ def _stamp_clock(heard: Heard) -> Clock | None:
     if np.unique(t).size < 3 or goes_back.mean() > 0.01:
         return None
     return _increasing(t, lines, "stamps of the lines")
+
+
+def _read_stamps(texts: Sequence[str]) -> Floats:
+    """Seconds since 1970, of the day or since some start, nan for another form.
+
+    Numbers that are too large for seconds are milli-, micro- or nanoseconds.
+    """
+    is_clock = np.array([":" in text for text in texts], dtype=bool)
+    seconds = np.full(len(texts), np.nan)
+    mostly_clocks = is_clock.mean() > 0.5
+    rows = np.flatnonzero(is_clock == mostly_clocks)
+    chosen = [texts[row] for row in rows.tolist()]
+    if not mostly_clocks:
+        numbers = np.array(chosen, dtype=np.float64)
+        unit = unit_since_1970(float(np.median(numbers)))
+        seconds[rows] = numbers * UNITS["time"][unit or "s"]
+        return seconds
+    with suppress(ValueError):  # such as 25:00:00
+        seconds[rows] = read_clock(chosen)
+    return seconds
 
 
 def _increasing(t: Floats, lines: Floats, source: str) -> Clock:

@@ -8,14 +8,42 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipgym.trials.readers.line_stamps import stamp_text
-
 #: A raw frame of NMEA 2000 in a line: as canboat, candump and the gateways of Yacht
 #: Devices and Actisense write it.
 RAW_FRAME = re.compile(
     r"\d{4}-\d\d-\d\d[^,\s]+,\d,\d{5,6},|can\d+\s+[0-9A-F]{8}(?:#|\s+\[)"
     r"|\d\d:\d\d:\d\d\.\d+ [RT] [0-9A-F]{8}\s|A\d+\.\d+ [0-9A-F]{5} [0-9A-F]{5}\s"
 )
+
+
+_TAG = re.compile(r"[\\,]c:(\d{9,14}(?:\.\d+)?)")
+_CLOCK = re.compile(
+    r"(?<!\d)(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4})?[-T ,;_Z]*"
+    r"(\d\d?:\d\d:\d\d(?:[.,]\d+)?)"
+    r" ?(Z|UTC|[+-]\d\d:?\d\d)?"
+)
+#: Seconds or fractions of them since 1970, or seconds with decimals since some start.
+_NUMBER = re.compile(r"(?<![\w.:/-])A?(\d{9,19}(?:\.\d+)?|\d+\.\d+)(?![\w.:/])")
+
+
+def stamp_text(before: str) -> str:
+    r"""The time in what a recorder wrote before a message; empty where there is none.
+
+    Examples are ``2021-05-03 09:59:50.123``, ``[12:00:01]``, ``1620035990123;A;``,
+    ``(1620035990.123) can0`` and ``\s:gyro,c:1620035990*3F\``.
+    """
+    tag = _TAG.search(before)
+    if tag is not None:
+        return tag[1]
+    clock = _CLOCK.search(before)
+    if clock is None:
+        number = _NUMBER.search(before)
+        return "" if number is None else number[1]
+    date, time, zone = clock.groups("")
+    if date[:4].isdigit():
+        date = re.sub("[/.]", "-", date)
+    zone = "" if zone in ("Z", "UTC") or not date else zone
+    return f"{date} {time.replace(',', '.')}{zone}".strip()
 
 
 class Value(NamedTuple):
