@@ -272,6 +272,8 @@ def _find_rows(
         return {line: row for line, row in rows.items() if line not in found}
     if max(found.values()) < n_cells and delimiter != BLANKS and not has_quotes:
         notes.append(f"{words} lack cells at their end, which are taken as missing")
+        for line, count in found.items():
+            rows[line] += delimiter * (n_cells - count)
         return rows
     raise InputError(
         f"{path}: line {first} (data row {[*rows].index(first) + 1}): expected"
@@ -314,8 +316,7 @@ def _columns(
             io.StringIO("\n".join(rows)),
             sep=r"\s+" if delimiter == BLANKS else delimiter,
             header=None,
-            names=range(n_cells),
-            index_col=False,
+            usecols=range(n_cells),
             keep_default_na=False,
             na_values=[""],
             low_memory=False,
