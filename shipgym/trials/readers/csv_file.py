@@ -272,8 +272,8 @@ def _find_rows(
         return {line: row for line, row in rows.items() if line not in found}
     if max(found.values()) < n_cells and delimiter != BLANKS and not has_quotes:
         notes.append(f"{words} lack cells at their end, which are taken as missing")
-        for line, count in found.items():
-            rows[line] += delimiter * (n_cells - count)
+        for odd, count in found.items():
+            rows[odd] += delimiter * (n_cells - count)
         return rows
     raise InputError(
         f"{path}: line {first} (data row {[*rows].index(first) + 1}): expected"
