@@ -185,7 +185,7 @@ def indices(model: ShipModel, ship: ShipModel, draws: int) -> dict[str, Row]:
     return found
 
 
-def case(name: str, structure: str, seed: int, draws: int) -> Row:
+def case(name: str, structure: str, seed: int, draws: int, uncertainty: str) -> Row:
     """One ship, structure and seed of the noise."""
     warnings.simplefilter("ignore")
     ship = FOREIGN[name]()
@@ -193,7 +193,7 @@ def case(name: str, structure: str, seed: int, draws: int) -> Row:
     row: Row = {"ship": name, "structure": structure, "seed": seed}
     began = time.process_time()
     try:
-        result = identified(ship, structure, trials)
+        result = identified(ship, structure, trials, uncertainty=uncertainty)
     except InputError as error:
         return row | {"refused": str(error)}
     model = result.model
@@ -316,6 +316,7 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=60, help="models drawn")
     parser.add_argument("--ships", type=ship_names, default=list(FOREIGN))
     parser.add_argument("--structures", default=",".join((*STRUCTURES, AUTO)))
+    parser.add_argument("--uncertainty", default="analytic", help="or posterior")
     parser.add_argument("--quick", action="store_true", help="three ships, 30 draws")
     parser.add_argument("--table", action="store_true", help="of FILE, nothing is run")
     given = parser.parse_args()
@@ -333,7 +334,7 @@ def main() -> None:
     ]
     for k, (ship, structure, seed) in enumerate([] if given.table else cases):
         print(f"{k + 1} of {len(cases)}: {ship}, {structure}", file=sys.stderr)
-        kept.add(case(ship, structure, seed, draws))
+        kept.add(case(ship, structure, seed, draws, given.uncertainty))
     rows = kept.rows
     print(table(rows, "structure"), table(rows, "ship"), turns(rows), sep="\n\n")
 

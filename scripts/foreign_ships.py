@@ -69,14 +69,13 @@ def sea_trials(ship: ShipModel, seed: int) -> list[Trial]:
 
 
 def identified(
-    ship: ShipModel, structure: str, trials: list[Trial]
+    ship: ShipModel, structure: str, trials: list[Trial], **settings: Any
 ) -> IdentificationResult:
     """A ship identified by a structure, with the method that `auto` uses for it."""
-    settings: Row = {}
     if structure in RESPONSES:
         settings["method"] = whole_trials()
     if structure == "grey-box":
-        settings = {"method": "rm-svm", "reference_model": "auto"}
+        settings |= {"method": "rm-svm", "reference_model": "auto"}
     return identify(
         trials,
         structure,
