@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import identification
-from identification.pipeline.options import AUTO
-from identification.pipeline.reading import identify_arguments, read_table
+from identification.pipeline.options import AUTO, identify_arguments, read_table
 from shipgym import ShipFile, Trial
 from shipgym.checks import placed
-from shipgym.ships.structures import GREY_BOX
+from shipgym.ships.structures import GREY_BOX, MMG
 
 
 def identification_settings(
@@ -64,6 +63,11 @@ def _choose_structure(
     elif "structure" in asked and "reference_model" not in asked:
         # one in the ship file belongs to the structure that is named there
         chosen.pop("reference_model", None)
+    if asked.get("structure") in (AUTO, MMG) and "method" not in asked:
+        # so does its method
+        for name in {name for name in chosen if name.split(".")[0] == "method"}:
+            if name not in asked:
+                del chosen[name]
 
     own = ship.structure
     if "kernel" not in chosen:

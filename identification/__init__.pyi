@@ -1,16 +1,16 @@
 from .design.experiment import Advice as Advice
 from .design.experiment import advise as advise
-from .design.reduced import (
+from .design.reduction import (
     ReducedIdentification as ReducedIdentification,
-)
-from .design.reduced import (
-    identify_reduced as identify_reduced,
 )
 from .design.reduction import (
     Reduction as Reduction,
 )
 from .design.reduction import (
     backward_elimination as backward_elimination,
+)
+from .design.reduction import (
+    identify_reduced as identify_reduced,
 )
 from .estimators.kernel_residual import KernelResidual as KernelResidual
 from .estimators.lssvm import (
@@ -21,10 +21,6 @@ from .estimators.lssvm import RidgeRegression as RidgeRegression
 from .estimators.lssvm import (
     TruncatedLSSVM as TruncatedLSSVM,
 )
-from .estimators.optimisers import ArtificialBeeColony as ArtificialBeeColony
-from .estimators.optimisers import GridSearch as GridSearch
-from .estimators.optimisers import ParticleSwarm as ParticleSwarm
-from .estimators.optimisers import SearchResult as SearchResult
 from .estimators.recursive import (
     MultiInnovationLeastSquares as MultiInnovationLeastSquares,
 )
@@ -42,8 +38,7 @@ from .models.refinement import Refinement as Refinement
 from .pipeline import identify as identify
 from .pipeline.options import Options as Options
 from .pipeline.result import IdentificationResult as IdentificationResult
-from .report.figures import plots as plots
-from .report.page import write_report as write_report
+from .report.view import write_report as write_report
 from .samples.prediction import predict as predict
 from .samples.preprocess import Preprocessing as Preprocessing
 from .samples.samples import Samples as Samples

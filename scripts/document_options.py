@@ -16,8 +16,13 @@ from typing import Any
 from griffe import Docstring, DocstringSectionKind
 
 from identification.models.methods import METHODS, make_method, method_options
-from identification.pipeline.options import STAGES, Options
-from identification.pipeline.reading import ARGUMENTS, WORDS, option_names
+from identification.pipeline.options import (
+    ARGUMENTS,
+    STAGES,
+    WORDS,
+    Options,
+    option_names,
+)
 
 PAGE = Path(__file__).parents[1] / "docs" / "identification.md"
 MARKS = re.compile(r"<!-- options: (.+?) -->\n.*?<!-- end of options -->", re.DOTALL)

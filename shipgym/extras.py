@@ -12,8 +12,8 @@ from shipgym.errors import InputError
 #: Classes of `identification` by the names that papers have for them.
 IN_PAPERS = {
     "TLSSVM": "TruncatedLSSVM",
-    "ABCLSSVR": "ArtificialBeeColony",
-    "PSOLSSVR": "ParticleSwarm",
+    "ABCLSSVR": "TunedLSSVM",
+    "PSOLSSVR": "TunedLSSVM",
     "LSSVR": "LSSVM",
     "LSSVM": "LSSVM",
     "RMSVM": "RMSVM",

@@ -50,7 +50,7 @@ def identify_command(
         result = identify_ship(read, settings)
         result.save(draft)
         if report:
-            from identification.report.page import write_report
+            from identification.report.view import write_report
 
             write_report(result, draft)
         written = [name for name in FILES if (draft / name).exists()]
@@ -145,7 +145,6 @@ def reduce_command(
     tolerance: Annotated[
         float, Option(min=0.0, help="How far R2 on held-out stretches may fall.")
     ] = 1e-3,
-    report: Report = False,
     *,
     options: dict[str, Any],
 ) -> None:
@@ -171,10 +170,6 @@ def reduce_command(
         found = reduce_ship(read, settings, tolerance)
         fields = found.to_dict()
         found.reduced.save(draft)
-        if report:
-            from identification.report.page import write_report
-
-            write_report(found.reduced, draft)
         write_json(fields, draft / "reduction.json")
     answer(fields)
     for q, reduction in found.reductions.items():

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from agents.verification.tracks import Track
-from identification.report.figures import RUDDER
+from identification.report.view import RUDDER
 from shipgym.arrays import Floats
 from shipgym.manoeuvres import Criterion
 from shipgym.manoeuvres.quantiles import band_95

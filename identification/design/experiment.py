@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import by_name, mean_square
-from identification.models.hard_turn import hard_turn_features
+from identification.models.guard import hard_turn_features
 from identification.samples.samples import Samples, build_samples
 from identification.text import as_text, lined_table
 from shipgym import InputError, ShipModel, Trial, UnstableModelError

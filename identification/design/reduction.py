@@ -6,8 +6,10 @@ relative standard error is dropped, unless what is held out is then explained wo
 others.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,9 +22,12 @@ from identification.judging.diagnostics import (
     correlation_matrix,
     variance_inflation,
 )
+from identification.pipeline import identify
+from identification.pipeline.result import IdentificationResult
 from identification.text import as_text
-from shipgym import InputError
-from shipgym.arrays import Floats
+from shipgym import InputError, Trial, register_structure
+from shipgym.arrays import Floats, finite
+from shipgym.ships import GreyBox, Structure
 
 FOLDS = 5
 
@@ -45,33 +50,30 @@ class ReductionStep:
 
 @dataclass(frozen=True)
 class Reduction:
-    """The whole path of a reduction and the model that it chose.
+    """The path of a reduction, whose last model is chosen.
 
     Attributes
     ----------
     path : tuple of ReductionStep
-        In the order in which terms were dropped or added.
-    chosen : int
-        Which of them.
+        In the order in which terms were dropped.
     """
 
     path: tuple[ReductionStep, ...]
-    chosen: int
 
     @property
     def terms(self) -> tuple[str, ...]:
         """Terms of the chosen model."""
-        return self.path[self.chosen].terms
+        return self.path[-1].terms
 
     @property
     def coefficients(self) -> dict[str, float]:
         """Coefficients of the chosen model."""
-        return self.path[self.chosen].coefficients
+        return self.path[-1].coefficients
 
     def __str__(self) -> str:
-        headings = ("terms", "changed", "worst relative error", "R2", "held-out R2", "")
+        headings = ("terms", "dropped", "worst relative error", "R2", "held-out R2")
         table = Table(*headings)
-        for k, step in enumerate(self.path):
+        for step in self.path:
             errors = step.relative_errors
             worst = max(errors, key=lambda name: errors[name])
             table.add_row(
@@ -80,7 +82,6 @@ class Reduction:
                 f"{errors[worst]:.3g} ({worst})",
                 f"{step.r_squared:.6f}",
                 f"{step.held_out:.6f}",
-                "chosen" if k == self.chosen else "",
             )
         return as_text(table)
 
@@ -188,7 +189,7 @@ def backward_elimination(
         path.append(step)
         kept.remove(regression.names.index(step.changed))
         best = max(best, step.held_out)
-    return Reduction(tuple(path), chosen=len(path) - 1)
+    return Reduction(tuple(path))
 
 
 def collinear_terms(features: Floats, kept: Sequence[int]) -> set[int]:
@@ -223,3 +224,133 @@ def _checked(X: ArrayLike, y: ArrayLike, names: Sequence[str]) -> _Regression:
         if not column.any():
             raise InputError(f"X, y: expected {name} to be excited, got 0 throughout")
     return _Regression(features, targets, labels)
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedIdentification:
+    """A structure reduced on its trials, and both models.
+
+    Attributes
+    ----------
+    full : IdentificationResult
+        With all terms.
+    reductions : dict of str to Reduction
+        By equation, the path and the terms chosen.
+    structure : Structure
+        Of the terms chosen, registered by its name.
+    reduced : IdentificationResult
+        With it.
+    """
+
+    full: IdentificationResult
+    reductions: dict[str, Reduction]
+    structure: Structure
+    reduced: IdentificationResult
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, ready for JSON."""
+        full, reduced = self.full, self.reduced
+        equations = {q: _plain_path(one) for q, one in self.reductions.items()}
+        return {
+            "structure": self.structure.name,
+            "equations": equations,
+            "terms": {
+                "full": len(full.coefficients),
+                "reduced": len(reduced.coefficients),
+            },
+            "trials": {
+                "full": full.metrics["trials"],
+                "reduced": reduced.metrics["trials"],
+            },
+        }
+
+
+def _plain_path(reduction: Reduction) -> list[dict[str, Any]]:
+    """The steps of a reduction, infinite errors as null."""
+    path = [asdict(step) for step in reduction.path]
+    for step in path:
+        errors = step["relative_errors"]
+        step["relative_errors"] = {name: finite(one) for name, one in errors.items()}
+    return path
+
+
+def identify_reduced(
+    trials: Sequence[Trial],
+    tolerance: float = 1e-3,
+    **arguments: Any,
+) -> ReducedIdentification:
+    """Identify a structure, reduce it on the same samples, and identify what is left.
+
+    Raises InputError for a grey box, whose table is what its reference ship leaves, for
+    a structure with a memory of yaw, and for fewer than five samples a term.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        As for `identify`. Those held out have no part in the reduction either.
+    tolerance : float
+        By how much the R2 of stretches held out may fall.
+    **arguments
+        Of `identify`.
+    """
+    full = identify(trials, **arguments)
+    table = full.model.table
+    _check_reducible(table)
+    reductions = {
+        q: backward_elimination(X, y, table.names(q), tolerance=tolerance)
+        for q, X, y in full.samples.by_equation()
+    }
+    smaller = reduced_structure(table, reductions)
+    names = [smaller.names(q) for q in smaller.equations]
+    digest = hashlib.sha256(repr(names).encode()).hexdigest()
+    registered = register_structure(
+        f"{table.name}-{digest[:6]}",
+        smaller.equations,
+        smaller.source,
+        smaller.normalisation,
+        smaller.quantity,
+    )
+    reduced = identify(trials, **{**arguments, "structure": registered.name})
+    return ReducedIdentification(full, reductions, registered, reduced)
+
+
+def _check_reducible(table: Structure) -> None:
+    """Refuse a structure whose equations are not those of its regression."""
+    if isinstance(table, GreyBox):
+        raise InputError(
+            "structure: expected one of its own to reduce, such as 'abkowitz', got"
+            f" {table.name!r}, whose table adds to a reference ship"
+        )
+    if tuple(table.regressed) != tuple(table.equations):
+        raise InputError(
+            "structure: expected one without memory to reduce, such as 'abkowitz', got"
+            f" {table.name!r}, whose memory of yaw has no regression of its own"
+        )
+
+
+def reduced_structure(
+    structure: Structure, reductions: Mapping[str, Reduction]
+) -> Structure:
+    """The structure with the terms that were chosen.
+
+    Of forces, sway and yaw, which inertia couples, keep the
+    terms that either needs.
+    """
+    kept = {
+        q: {
+            term.name
+            for term, label in zip(
+                structure.equations[q], structure.names(q), strict=True
+            )
+            if label in reductions[q].terms
+        }
+        for q in structure.equations
+    }
+    if structure.quantity == "force" and {"v", "r"} <= kept.keys():
+        kept["v"] = kept["r"] = kept["v"] | kept["r"]
+    equations = {
+        q: tuple(term for term in structure.equations[q] if term.name in names)
+        for q, names in kept.items()
+    }
+    source = f"{structure.source}; reduced"
+    return replace(structure, source=source, equations=equations)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identification.estimators.estimator import Estimator, Estimators, weights
+from identification.estimators.linear import Estimator, Estimators, weights
 from identification.estimators.threads import single_threaded
 from identification.samples.samples import Samples
 from shipgym.arrays import Flags, Floats

@@ -8,28 +8,59 @@ but insensitive band and solver are those of the epsilon-SVR that is fitted here
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import clone
 from sklearn.exceptions import ConvergenceWarning
-from sklearn.svm import SVR, LinearSVR
+from sklearn.svm import LinearSVR
 
 from identification.arrays import column_rms, root_mean_square
 from identification.estimators.decomposition import scales_of
-from identification.estimators.estimator import Estimators
-from identification.estimators.linear import LinearRegressor, validated
-from identification.estimators.pattern_search import pattern_search
-from identification.samples.folds import FOLDS, TRIALS, held_out_rows
+from identification.estimators.linear import Estimators, LinearRegressor, validated
 from identification.samples.prediction import predict
-from identification.samples.problem import Problem
+from identification.samples.problem import FOLDS, TRIALS, Problem, held_out_rows
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.ships import GreyBox
+
+
+def pattern_search(
+    objective: Callable[[Floats], float],
+    start: Floats,
+    mesh: float = 0.25,
+    finest: float = 1.0 / 64.0,
+    most_evaluations: int = 200,
+) -> Floats:
+    """Minimise a function of a point of the unit cube without derivatives.
+
+    Each round polls the 2n neighbours on the mesh and moves to the best of them if it
+    is better; else the mesh is halved until it is finer than `finest`. No point is
+    evaluated twice, and no round begins after `most_evaluations`.
+    """
+
+    @cache
+    def value_at(*point: float) -> float:
+        return objective(np.array(point))
+
+    best = np.clip(start, 0.0, 1.0)
+    value_at(*best.tolist())
+    axes = np.eye(len(best))
+    directions = np.vstack([axes, -axes])
+    while mesh >= finest and value_at.cache_info().currsize < most_evaluations:
+        neighbours = np.clip(best + mesh * directions, 0.0, 1.0).tolist()
+        nearest = min(neighbours, key=lambda point: value_at(*point))
+        if value_at(*nearest) < value_at(*best.tolist()):
+            best = np.array(nearest)
+        else:
+            mesh *= 0.5
+    return best
+
 
 #: Weight of the errors at which nothing is added to the reference ship.
 NO_CORRECTION = 0.0
@@ -154,13 +185,8 @@ class RMSVM(LinearRegressor):
 
 
 def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
-    """Slopes of an epsilon-SVR without offset.
-
-    By coordinate descent, whose time is proportional to the number of samples; where it
-    does not converge, by sequential minimal optimisation of the samples and their
-    mirror image, which makes the offset zero.
-    """
-    quick = LinearSVR(
+    """Slopes of an epsilon-SVR without offset, by coordinate descent."""
+    machine = LinearSVR(
         C=C,
         epsilon=band,
         fit_intercept=False,
@@ -169,15 +195,8 @@ def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
         max_iter=20_000,
         random_state=0,
     )
-    with warnings.catch_warnings(action="error", category=ConvergenceWarning):
-        try:
-            return np.asarray(quick.fit(Z, e).coef_, dtype=float)
-        except ConvergenceWarning:
-            pass
-
-    both = SVR(kernel="linear", C=0.5 * C, epsilon=band)
-    both.fit(np.vstack([Z, -Z]), np.append(e, -e))
-    return np.asarray(both.coef_, dtype=float).ravel()
+    with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
+        return np.asarray(machine.fit(Z, e).coef_, dtype=float)
 
 
 class _Tuner:

@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.arrays import by_name, column_rms, mean_square, root_mean_square
 from identification.estimators.covariance import residuals
-from identification.estimators.estimator import Estimator, Estimators
+from identification.estimators.linear import Estimator, Estimators
 from identification.samples.samples import Samples
 from shipgym.arrays import Floats
 from shipgym.ships import Structure

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from identification.estimators.estimator import Estimator
+    from identification.estimators.linear import Estimator
     from identification.judging.diagnostics import EquationDiagnostics
     from identification.samples.samples import Samples
     from shipgym import ShipModel, Trial

@@ -1,27 +1,118 @@
 """Posterior of the coefficients by sampling, draws of which the model keeps."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
+import emcee
 import numpy as np
 
 from identification.arrays import rounded
 from identification.judging.coarsened import CoarsenedPosterior
 from identification.judging.model_error import FEWEST_TRIALS, model_error
-from identification.judging.sampling import (
-    LogDensity,
-    Mixing,
-    mixing_of,
-    sample,
-)
 from identification.judging.uncertainty import Uncertainty
-from identification.models.sailed import CoefficientPrior, Sailed
-from identification.models.segments import Segment, compared_channels, cut
+from identification.models.sailed import (
+    CoefficientPrior,
+    Sailed,
+    Segment,
+    compared_channels,
+    cut,
+)
+from identification.progress import counted
 from identification.samples.prediction import with_start
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
+
+#: From points, shape (n_points, n_parameters), to the logarithm of their density, shape
+#: (n_points,); minus infinity where it is 0.
+LogDensity = Callable[[Floats], Floats]
+
+
+class Mixing(NamedTuple):
+    """Diagnostics of walkers, each of the parameter that mixed worst."""
+
+    steps: int  # after the warm-up
+    #: by the scatter of the walkers' means, which is that of the points for walkers
+    #: that never moved
+    effective_samples: float
+    drift: float  # of the mean from the first half to the second, standard deviations
+
+    @property
+    def is_enough(self) -> bool:
+        """Whether the points can stand for the density."""
+        return self.effective_samples > 150.0 and self.drift < 0.5
+
+
+def sample(log_density: LogDensity, start: Floats, steps: int) -> Floats:
+    """Points of a density from steps of walkers, after half as many to warm up.
+
+    Shape (n_steps, n_walkers, n_parameters). `start` are the walkers, shape (n_walkers,
+    n_parameters), at least twice as many as parameters. A quarter of the moves is
+    differential evolution (ter Braak 2006, Statistics and Computing 16), the others are
+    `autoregression` about the points of the last stage of the warm-up.
+    """
+    walkers, near = start, start
+    state = np.random.RandomState(0).get_state()
+    for share in (0.1, 0.15, 0.25, 1.0):
+        n_steps = max(int(share * steps), 2)
+        moves = [(emcee.moves.DEMove(), 0.25), (autoregression(near), 0.75)]
+        sampler = emcee.EnsembleSampler(
+            *start.shape, log_density, moves=moves, vectorize=True
+        )
+        last = emcee.State(
+            walkers,
+            random_state=state,
+        )
+        parts = [len(part) for part in np.array_split(range(n_steps), min(10, n_steps))]
+        for n_part in counted("posterior", parts):
+            last = sampler.run_mcmc(last, n_part)
+        walkers, state = last.coords, last.random_state
+        near = sampler.get_chain(discard=n_steps // 2, flat=True)
+    found: Floats = sampler.get_chain()
+    return found
+
+
+def autoregression(points: Floats) -> Any:
+    """Move that a normal distribution of the mean and scatter of points always takes.
+
+    The preconditioned Crank-Nicolson proposal (Cotter et al. 2013, Statistical Science
+    28, eq. 4.7) of random length; the distribution is a little wider than the points.
+    """
+    n_parameters = points.shape[1]
+    mean = points.mean(axis=0)
+    covariance = np.atleast_2d(np.cov(points.T))
+    least = 1e-12 * np.trace(covariance) / n_parameters + 1e-300
+    root = np.linalg.cholesky(1.2 * covariance + least * np.eye(n_parameters))
+
+    def log_normal(at: Floats) -> Floats:
+        standard = np.linalg.solve(root, (at - mean).T)
+        return np.asarray(-0.5 * np.sum(standard**2, axis=0))
+
+    def propose(walkers: Floats, rng: Any) -> tuple[Floats, Floats]:
+        length = np.sqrt(rng.random_sample((len(walkers), 1)))
+        kept = np.sqrt(1.0 - length**2) * (walkers - mean)
+        moved = mean + kept + length * rng.standard_normal(walkers.shape) @ root.T
+        return moved, log_normal(walkers) - log_normal(moved)
+
+    return emcee.moves.MHMove(propose)
+
+
+def mixing_of(points: Floats) -> Mixing:
+    """Diagnostics of points, shape (n_steps, n_walkers, n_parameters)."""
+    n_steps, n_walkers, _ = points.shape
+    variance = np.maximum(
+        points.var(axis=(0, 1)),
+        np.finfo(float).tiny,
+    )
+    of_means = points.mean(axis=0).var(axis=0, ddof=1)
+    half = n_steps // 2
+    drift = points[half:].mean(axis=(0, 1)) - points[:half].mean(axis=(0, 1))
+    return Mixing(
+        steps=n_steps,
+        effective_samples=n_walkers * float((variance / of_means).min()),
+        drift=float((np.abs(drift) / np.sqrt(variance)).max()),
+    )
 
 
 def table_prior(model: ShipModel) -> CoefficientPrior:
@@ -81,14 +172,19 @@ def with_posterior(
 
     by_scatter = CoarsenedPosterior(whole, scales, power=1.0)
     mode = by_scatter.mode(start)
-    remarks = contradictions(whole, mode.point)
     by_scatter = replace(by_scatter, scales=whole.scales(mode.point))
     posterior, error = coarsened(by_scatter, trials, start)
 
     chains = _chains(posterior, start, asked)
     mixing = mixing_of(chains)
+    remarks = []
     if not mixing.is_enough:
-        remarks.append(_not_mixed(mixing))
+        remarks.append(
+            f"posterior: the walkers did not mix in {mixing.steps} steps"
+            f" ({mixing.effective_samples:.0f} effective samples, drift"
+            f" {mixing.drift:.2f}); the covariance is kept: try uncertainty.steps ="
+            f" {4 * mixing.steps}"
+        )
     else:
         points = chains.reshape(-1, prior.n_parameters)
         model = _with_draws(model, prior, points)
@@ -209,37 +305,3 @@ def _walkers(
     chosen = points[order[-n_walkers:]]
     chosen[~np.isfinite(log_density(chosen))] *= 0.01
     return np.asarray(chosen)
-
-
-def contradictions(whole: Sailed, point: Floats) -> list[str]:
-    """A remark where the trials contradict the prior, on what is farthest off.
-
-    `point` is the most probable one by the scatter of the errors alone: where the
-    likelihood counts for less, a narrow prior would hide that it is wrong.
-    """
-    prior = whole.prior
-    off = prior.coefficients(point[None])[0] - prior.mean
-    off /= np.where(
-        prior.deviations > 0.0,
-        prior.deviations,
-        np.inf,
-    )
-    worst = int(np.abs(off).argmax())
-    if abs(off[worst]) <= 3.0:
-        return []
-    name = list(whole.blank.coefficients)[worst]
-    return [
-        "prior: expected coefficients within 3 standard deviations of the prior"
-        f" ({prior.source}), got {name} {off[worst]:+.1f} from its mean by the trials;"
-        " check the particulars, or choose another prior"
-    ]
-
-
-def _not_mixed(mixing: Mixing) -> str:
-    """A remark on walkers that did not mix."""
-    return (
-        f"posterior: the walkers did not mix in {mixing.steps} steps"
-        f" ({mixing.effective_samples:.0f} effective samples, drift"
-        f" {mixing.drift:.2f}); the covariance is kept: try uncertainty.steps ="
-        f" {4 * mixing.steps}"
-    )

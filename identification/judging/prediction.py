@@ -1,12 +1,112 @@
 """Errors of predicted trials, and indices of their manoeuvres."""
 
-from typing import Any
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from identification.arrays import root_mean_square
-from identification.judging.closed_loop import closed_loop
-from identification.samples.prediction import COMPARED, predicted_channels
-from shipgym import InputError, ShipModel, Trial
+from identification.samples.prediction import COMPARED, predicted_channels, with_start
+from shipgym import InputError, ShipModel, Trial, UnstableModelError
+from shipgym.arrays import Floats
 from shipgym.manoeuvres import switch_heading_deg, turning_indices, zigzag_indices
+from shipgym.manoeuvres.execution import reversals, rudder
+from shipgym.models.simulate import orders
+
+
+class ZigzagLeg(NamedTuple):
+    """Part of a zigzag between two reversals of the rudder."""
+
+    order: float | None  # rudder angle, rad; None: as measured
+    duration: float  # s, as measured
+    # the heading at which it ends, rad; None where it ends by the clock
+    target: float | None
+
+
+def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
+    """A zigzag with the measured rudder angles, reversed at the measured headings.
+
+    The model's gear moves the rudder. None where the model runs away or a heading is
+    never reached, without a reversal, and for a model whose state is not recorded.
+    """
+    names = model.state_names
+    if not {*trial.channels, "x", "y"}.issuperset(names):
+        return None
+    begun = with_start(model, trial)
+    state = [begun[name][0] if name in begun else 0.0 for name in names]
+    row = np.array([trial.t[0], *state, 0.0])
+    rows = []
+    try:
+        for leg in legs(trial):
+            sailed = _sail(model, trial, leg, row)
+            if sailed is None:
+                return None
+            rows.append(sailed[:-1])
+            row = sailed[-1]
+    except UnstableModelError:
+        return None
+    t, *columns = np.vstack([*rows, row]).T
+    return Trial(
+        t,
+        dict(zip((*names, "delta_command"), columns, strict=True)),
+        name=trial.name,
+        kind=trial.kind,
+        length=model.particulars["length"],
+    )
+
+
+@lru_cache(maxsize=16)  # every model drawn sails the same trials
+def legs(trial: Trial) -> tuple[ZigzagLeg, ...]:
+    """Legs of a measured zigzag; the approach and the last one end by the clock."""
+    start, turns = reversals(trial)
+    t, delta = trial.t, rudder(trial)
+    edges = [float(t[0]), start, *turns, float(t[-1])]
+    found = list[ZigzagLeg]()
+    for number, (begin, end) in enumerate(pairwise(edges)):
+        held = (t >= 0.25 * begin + 0.75 * end) & (t <= end)
+        if end <= begin or not held.any():
+            continue
+        target = None
+        if 1 <= number <= len(turns):
+            target = float(np.interp(end, t, trial["psi"]))
+        is_approach = not found and target is None
+        order = None if is_approach else float(np.median(delta[held]))
+        found.append(ZigzagLeg(order, end - begin, target))
+    return tuple(found)
+
+
+def _sail(
+    model: ShipModel, trial: Trial, leg: ZigzagLeg, first: Floats
+) -> Floats | None:
+    """Times, states and orders of a leg, shape (n_samples, n_state + 2).
+
+    From a first row. None where its target is not reached in twice the measured time.
+    """
+    dt = 0.02 * model.travel_time
+    longest = leg.duration * (1.0 if leg.target is None else 2.0)
+    n_steps = max(int(np.ceil(longest / dt)), 2)
+    t = first[0] + dt * np.arange(n_steps + 1.0)
+    ordered = np.interp(t[:-1], trial.t, rudder(trial))
+    if leg.order is not None:
+        ordered[:] = leg.order
+    shaft = None
+    if "n" in model.command_names and "n" in trial:
+        shaft = np.interp(t[:-1], trial.t, trial["n"])
+    run = model.simulate(orders(model, ordered, shaft), dt, first[1:-1])
+    channels = (*model.state_names, "delta_command")
+    rows = np.column_stack([t, *[run[name] for name in channels]])
+    if leg.target is None:
+        return rows
+    left = leg.target - run["psi"]
+    last = int(np.argmax(left * np.sign(left[0]) <= 0.0))
+    if last == 0:
+        return None
+    # a step is a fiftieth of a length: between two the state is straight enough
+    part = left[last - 1] / (left[last - 1] - left[last])
+    rows[last] = (1.0 - part) * rows[last - 1] + part * rows[last]
+    return rows[: last + 1]
+
 
 ZIGZAG = ("overshoot_1_deg", "overshoot_2_deg")
 

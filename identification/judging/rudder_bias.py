@@ -147,12 +147,13 @@ def _of_companion(problem: Problem) -> RudderBias:
     table = get_structure("norrbin-bias")
     samples = problem.rows_of(table, problem.blank)
     estimators = fit_all(get_method("ls").make, samples)
-    blank = ShipModel(
-        name=problem.blank.name,
+    blank = replace(
+        problem.blank,
         structure=table.name,
-        particulars=problem.blank.particulars,
-        steering=problem.blank.steering,
+        dynamics=table,
         coefficients=dict.fromkeys(table.coefficient_names, 0.0),
+        covariance=None,
+        draws=None,
     )
     n_trials = len(problem.used)
     if n_trials < FEWEST_TRIALS:

@@ -15,13 +15,12 @@ from scipy.linalg import eigh
 from sklearn.cluster import KMeans
 
 from identification.arrays import column_rms
-from identification.estimators.estimator import Estimators
 from identification.estimators.kernel_residual import KernelResidual
+from identification.estimators.linear import Estimators
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.rm_svm import heading_error, most_regularised
-from identification.samples.folds import held_out_rows
 from identification.samples.preprocess import smoothed_channels
-from identification.samples.problem import Problem
+from identification.samples.problem import Problem, held_out_rows
 from identification.samples.samples import Samples
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats, finite

@@ -1,7 +1,7 @@
 """Methods of identification: which estimator is fitted to each equation."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -12,8 +12,7 @@ from sklearn.base import clone
 from identification.arrays import column_rms
 from identification.estimators.adapted import Adapted
 from identification.estimators.decomposition import scales_of
-from identification.estimators.estimator import Estimator, Estimators
-from identification.estimators.linear import LinearRegressor
+from identification.estimators.linear import Estimator, Estimators, LinearRegressor
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.tuned import TunedLSSVM
 from identification.models.refinement import Refinement
@@ -92,12 +91,8 @@ def get_method(method: str | Any) -> Method:
     if isinstance(method, str):
         method = make_method(check_choice(method, METHODS, "method"))
     if isinstance(method, Refinement):
-        start = get_method(method.start)
-        return Method(
-            name=Refinement.name,
-            make=start.make,
-            refinement=method,
-        )
+        start = get_method(TruncatedLSSVM())
+        return replace(start, name=Refinement.name, refinement=method)
     if not hasattr(method, "fit"):
         raise InputError(
             f"method: expected one of {quoted(METHODS)}, or an estimator with"
@@ -156,9 +151,8 @@ def without_constant(estimator: Any) -> Estimator:
 
 def method_options(name: str) -> tuple[str, ...]:
     """Names of the settings that a method of `METHODS` has."""
-    kind = _kind(name)
-    own: tuple[str, ...] = kind.options
-    return (*own, *TruncatedLSSVM.options) if kind is Refinement else own
+    own: tuple[str, ...] = _kind(name).options
+    return own
 
 
 def make_method(name: str, settings: Mapping[str, Any] | None = None) -> Any:
@@ -176,10 +170,4 @@ def make_method(name: str, settings: Mapping[str, Any] | None = None) -> Any:
                 " that it does not know; leave it out, or choose the method that it is"
                 " for"
             )
-    kind = _kind(name)
-    if kind is not Refinement:
-        return kind(**{**METHODS[name][1], **settings})
-
-    own = {name: settings[name] for name in settings if name in Refinement.options}
-    of_start = {name: settings[name] for name in settings if name not in own}
-    return Refinement(**own, start=TruncatedLSSVM(**of_start))
+    return _kind(name)(**{**METHODS[name][1], **settings})

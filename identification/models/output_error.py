@@ -6,21 +6,37 @@ Trials are sailed in segments, each from a start that is fitted too (multiple sh
 Bock 1983): whole trials would let a drift of heading leak into the coefficients.
 """
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from identification.arrays import by_name, column_rms, root_mean_square
 from identification.estimators.covariance import newey_west
+from identification.estimators.linear import Estimators
 from identification.least_squares import (
     Linearised,
     fit_least_squares,
 )
-from identification.models.sailed import with_prior
-from identification.models.segments import BLOCK, Segment, velocities
-from identification.models.shooting import channel_units, in_columns, sail
-from shipgym import ShipModel
+from identification.models.guard import GuardedFit, reasons_unstable
+from identification.models.refinement import WHOLE, Refinement
+from identification.models.sailed import (
+    BLOCK,
+    Segment,
+    channel_units,
+    compared_channels,
+    cut,
+    in_columns,
+    sail,
+    velocities,
+    with_prior,
+)
+from identification.samples.problem import Problem
+from identification.samples.samples import Samples
+from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats, Integers
 from shipgym.trials.resampling import usual_step
 
@@ -170,11 +186,6 @@ class OutputError:
         with np.errstate(invalid="ignore", over="ignore"):  # of ships that ran away
             slopes = (sailed[:, :, 1:] - channels[:, :, None]) / step
         return channels, slopes
-
-    def start_scales(self) -> Floats:
-        """Scales of the residuals at the start; not finite where a ship runs away."""
-        shooting = self.shoot(self.start, self.segments, self.units)
-        return self.scales(shooting, self.units)
 
     def scales(self, shooting: Shooting, scales: Floats) -> Floats:
         """Root mean square of the residuals by channel, per sample.
@@ -336,3 +347,101 @@ def without_start(
     residual = residual - q @ explained
     others = others - q @ (q.T @ others)
     return residual, others, move
+
+
+def refine(
+    start: GuardedFit,
+    problem: Problem,
+    settings: Refinement,
+    memory: float,
+    rounds: int = 3,
+) -> GuardedFit:
+    """Refine a fit by the errors of what its model simulates in segments of the trials.
+
+    `start`: the fit to start from; `problem`: its regression shows how large the
+    terms are in the trials; `memory`: time over which residuals are
+    taken to be correlated, s; `rounds`: of fits, between which scales and starts of the
+    segments are renewed, of which one does from near the end. A refined model that runs
+    away is pulled ten times harder to the start, up to three times. Returns the start
+    itself where its model runs away already, or the refined ones do however hard they
+    are pulled.
+    """
+    fit = _posed(start, problem, settings)
+    report = {name: getattr(settings, name) for name in settings.options}
+    at_start = fit.shoot(fit.start, fit.segments, fit.units)
+    scales = fit.scales(at_start, fit.units)  # not finite where a ship runs away
+    if not (start.stable and np.isfinite(scales).all()):
+        report["decision"] = "not refined: the start runs away"
+        return replace(start, refinement=report)
+
+    rejected = list[dict[str, Any]]()
+    pull = settings.pull
+    for _ in range(4):
+        solution = fit.solve(scales, pull, rounds)
+        coefficients = solution.parameters * fit.term_sizes
+        blank = start.model
+        values = np.linalg.solve(blank.acceleration_matrix, coefficients)
+        model = blank.with_coefficients(np.asarray(values, dtype=float))
+        reasons = reasons_unstable(model, problem.used)
+        if reasons:
+            rejected.append({"pull": pull, "reasons": reasons})
+            pull = max(10.0 * pull, 1e-9)
+            continue
+        report |= {
+            "residual_rms": by_name(fit.channels, solution.scales),
+            "pull": solution.pull,
+            "decision": "refined",
+        }
+        if rejected:
+            report["rejected"] = rejected
+        covariance, influences = fit.covariance(solution, memory)
+        return replace(
+            start,
+            model=model,
+            estimators=_with_values(start, coefficients),
+            refinement=report,
+            covariance=covariance,
+            influences=influences,
+        )
+
+    report |= {"decision": "not refined: it runs away", "rejected": rejected}
+    return replace(start, refinement=report)
+
+
+def _with_values(start: GuardedFit, coefficients: Floats) -> Estimators:
+    """Estimators of refined coefficients, for the diagnostics."""
+    estimators = {}
+    for q, rows in start.model.table.regression_rows.items():
+        estimators[q] = copy.copy(start.estimators[q])
+        estimators[q].coef_ = coefficients[rows]
+    return estimators
+
+
+def _posed(start: GuardedFit, problem: Problem, settings: Refinement) -> OutputError:
+    """The problem: segments of the trials, and coefficients in units of their terms."""
+    blank = start.model
+    if "q" in blank.table.equations:
+        raise InputError(
+            "method 'output-error': expected a structure without a memory of yaw,"
+            f" whose state no trial records, got {blank.structure!r}; choose method"
+            " 'tls-svm'"
+        )
+    channels = compared_channels(blank, problem.used)
+    equations = blank.table.equations
+    sizes = np.concatenate([term_sizes(problem.samples, q) for q in equations])
+    values = np.concatenate([start.estimators[q].coef_ for q in equations])
+    lengths = settings.segment_lengths
+    staggered = lengths < WHOLE
+    segments = cut(problem.used, blank, channels, lengths, staggered)
+    return OutputError(blank, channels, sizes, segments, values / sizes, staggered)
+
+
+def term_sizes(samples: Samples, equation: str) -> Floats:
+    """Coefficients whose terms would make up the whole change of a velocity.
+
+    Shape (n_terms,).
+    """
+    change = root_mean_square(samples.targets[equation])
+    terms = column_rms(samples.features[equation])
+    # never 0: coefficients are divided by the size of a term that is not seen, too
+    return change / np.where(terms > 0.0, terms, np.inf) + np.finfo(float).tiny

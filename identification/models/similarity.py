@@ -1,6 +1,7 @@
 """The ship most like another, by its main dimensions (Mei 2019, equations 3 to 6)."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -8,9 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.arrays import by_name
-from shipgym import InputError, Particulars, ShipModel, load_model
+from shipgym import InputError, Particulars, ShipModel, Trial, load_model
 from shipgym.arrays import Floats
+from shipgym.models import grey_box
 from shipgym.models.catalogue import REFERENCE_SHIPS
+from shipgym.ships import GreyBox
 from shipgym.ships.particulars import with_estimates
 
 
@@ -139,3 +142,44 @@ def _usual_block(known: Particulars) -> float:
     box = known.length * known.require("beam") * known.require("draught")
     density = known.water_density or 1025.0
     return min(max(known.mass / (density * box), 0.4), 0.9)
+
+
+def chosen_box(
+    reference: str | ShipModel | None,
+    particulars: Particulars,
+    trials: Sequence[Trial],
+) -> tuple[GreyBox, dict[str, float]]:
+    """The grey box of a reference ship.
+
+    Also returns the correlations of the candidates where she was not named.
+
+    Parameters
+    ----------
+    reference : str, ShipModel or None
+        A model, its name or file; "auto" or None chooses the one most like the target
+        by `select_reference`.
+    particulars : Particulars
+        Of the target.
+    trials : sequence of Trial
+        Of the target; they tell whether its shaft speed and roll are known.
+    """
+    recorded: set[str] = set()
+    if trials:
+        recorded = set.intersection(*(set(trial.channels) for trial in trials))
+
+    similarity: dict[str, float] = {}
+    if reference in (None, "auto"):
+        with suppress(InputError):  # too little may be known to estimate the rest
+            particulars = particulars.completed()
+        reference, similarity = select_reference(particulars, recorded)
+        least, found = 0.5, similarity[reference]
+        if found < least:
+            raise InputError(
+                "reference_model: 'auto' expected a ship like this one, with a"
+                f" similarity of at least {least:g}, got {reference!r} with {found:.2f}"
+                ' as the best; choose structure "abkowitz" or "cubic", or name the ship'
+                f" all the same: reference_model = {reference!r}"
+            )
+    box = grey_box(reference)
+    has_shaft = box.shaft and "n" in recorded
+    return replace(box, shaft=has_shaft), similarity

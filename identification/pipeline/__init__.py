@@ -6,11 +6,15 @@ from typing import Any
 
 from identification.estimators.threads import single_threaded
 from identification.pipeline.by_regression import by_regression
-from identification.pipeline.options import AUTO, Options
-from identification.pipeline.reading import identify_arguments, read_table
+from identification.pipeline.options import (
+    AUTO,
+    Options,
+    identify_arguments,
+    read_table,
+)
 from identification.pipeline.result import IdentificationResult, with_provenance
 from identification.progress import announce
-from identification.samples.problem import held_out
+from identification.samples.problem import named_apart
 from identification.samples.still_water import in_still_water
 from shipgym import Trial
 from shipgym.ships.structures import MMG
@@ -46,7 +50,7 @@ def identify(
     """
     asked = Options(*arguments, **_read(options))
     marked, sea = in_still_water(
-        held_out(trials, asked.hold_out),
+        named_apart(trials),
         asked.particulars,
         asked.current,
         asked.wind,
@@ -54,7 +58,7 @@ def identify(
     if asked.kernel is None and asked.structure not in (AUTO, MMG):
         result = by_regression(marked, asked)
     else:
-        from identification.pipeline.routes import identified
+        from identification.pipeline.choice import identified
 
         announce(f"identifying {len(marked)} trials, some seconds")
         result = identified(marked, asked)

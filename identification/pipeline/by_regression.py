@@ -1,10 +1,28 @@
 """From trials to a ship model by the regression of each equation of motion."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
-from identification.estimators.covariance import without_trials
-from identification.judging.rudder_bias import with_bias
+import numpy as np
+
+import shipgym
+from identification.estimators.covariance import (
+    coefficient_covariance,
+    joint_covariance,
+    without_trials,
+)
+from identification.estimators.linear import Estimators
+from identification.judging.diagnostics import diagnose
+from identification.judging.model_error import (
+    FEWEST_TRIALS,
+    Without,
+    beyond_trials,
+    model_error,
+    with_sound_draws,
+)
+from identification.judging.prediction import trial_metrics
+from identification.judging.rudder_bias import rudder_bias, with_bias
 from identification.models.guard import (
     GuardedFit,
     guarded_fit,
@@ -12,18 +30,239 @@ from identification.models.guard import (
 )
 from identification.models.methods import Method, get_method
 from identification.models.refinement import Refinement, whole_trials
-from identification.pipeline.evaluation import (
-    MEMORY,
-    provenance_of,
-    with_uncertainty,
+from identification.models.sailed import CoefficientPrior
+from identification.pipeline.options import (
+    DEFAULT_METHOD,
+    Options,
+    name_of,
+    settings_of,
+    whole_call,
 )
-from identification.pipeline.options import Options
 from identification.pipeline.pose import pose
 from identification.pipeline.result import IdentificationResult
+from identification.samples.prediction import is_yaw_alone, predict
 from identification.samples.problem import Problem
+from identification.samples.samples import Samples
 from shipgym import ShipModel, Trial, list_structures
-from shipgym.ships import Structure, get_structure
+from shipgym.arrays import Floats
+from shipgym.manoeuvres.measured import measured_indices
+from shipgym.ships import GreyBox, Structure, get_structure
 from shipgym.ships.structures import GREY_BOX
+
+MEMORY = 1.0  # of residuals, in the time to sail one ship length
+
+
+def provenance_of(
+    options: Options, method: str, fit: GuardedFit, problem: Problem
+) -> dict[str, Any]:
+    """Provenance of a model, for its file."""
+    further: dict[str, Any] = {}
+    if isinstance(problem.table, GreyBox):
+        further["reference"] = {
+            "name": problem.table.ship.name,
+            "similarity": problem.similarity,
+            "shaft": problem.table.shaft,
+        }
+    searched = {
+        q: estimator.chosen_
+        for q, estimator in fit.estimators.items()
+        if hasattr(estimator, "chosen_")
+    }
+    if searched:
+        further["search"] = searched
+
+    return {
+        "structure": name_of(options.structure),
+        "method": method if fit.held_by is None else fit.held_by,
+        "samples": options.samples.rule,
+        "settings": settings_of(
+            options, ("samples", "preprocessing", "guarded", "method")
+        ),
+        **further,
+        "software": f"shipgym {shipgym.__version__}",
+        "steps_per_window": problem.samples.window,
+        "guard": fit.report,
+        "stable": fit.stable,
+        "trials": [_trial_record(trial) for trial in problem.used],
+    }
+
+
+def _trial_record(trial: Trial) -> dict[str, Any]:
+    """A fitted trial for the provenance."""
+    record: dict[str, Any] = {
+        "name": trial.name,
+        "sha256": trial.raw.sha256,
+        "derived": sorted(trial.derived),
+    }
+    if trial.repaired:
+        record["repaired"] = dict(trial.repaired)
+    return record
+
+
+def with_uncertainty(
+    fit: GuardedFit,
+    problem: Problem,
+    provenance: dict[str, Any],
+    options: Options,
+    without: Without | None = None,
+) -> IdentificationResult:
+    """The result of a fit by regression, its covariance scaled by the model error.
+
+    `without`: the model of the other trials, where it is known.
+    """
+    covariance = _of_fit(fit, problem)
+    model = replace(fit.model, covariance=covariance)
+    if options.uncertainty.model_error:
+        again = without if is_yaw_alone(model) else None
+        left_out = left_out_models(fit, problem, model, again)
+        error = model_error(model, left_out, problem.used)
+        model = replace(model, covariance=error["factor"] ** 2 * covariance)
+        provenance["model_error"] = error
+    return certain(
+        model,
+        fit,
+        problem,
+        provenance,
+        options,
+        without,
+    )
+
+
+def certain(
+    model: ShipModel,
+    fit: GuardedFit,
+    problem: Problem,
+    provenance: dict[str, Any],
+    options: Options,
+    without: Without | None,
+    prior: CoefficientPrior | None = None,
+) -> IdentificationResult:
+    """The result of a model with covariance: widened beyond the trials, or sampled.
+
+    `prior`: of a posterior; by default that of a table.
+    """
+    asked, used = options.uncertainty, problem.used
+    if asked.by_sampling:
+        from identification.judging.posterior import table_prior, with_posterior
+
+        prior = prior or table_prior(model)
+        model, report = with_posterior(model, used, prior, asked)
+        provenance |= {"uncertainty": "posterior", "posterior": report}
+    elif without is not None and fit.stable and asked.model_error:
+        model, beyond = beyond_trials(model, without, used)
+        provenance["model_error"] |= beyond
+        model = with_sound_draws(model, used)
+    return evaluated(model, fit, problem, provenance, options)
+
+
+def _of_fit(fit: GuardedFit, problem: Problem) -> Floats:
+    """Covariance of the coefficients of a fit, refined or by regression alone."""
+    if fit.covariance is None:
+        return _of_regression(fit.estimators, problem.samples, problem.blank)
+    return coefficient_covariance(fit.covariance, problem.blank.acceleration_matrix)
+
+
+def _of_regression(
+    estimators: Estimators, samples: Samples, blank: ShipModel
+) -> Floats:
+    """Covariance of the coefficients by the residuals of a regression.
+
+    Errors are correlated over the time to sail one ship length.
+    """
+    covariance = joint_covariance(estimators, samples, MEMORY * blank.travel_time)
+    return coefficient_covariance(covariance, blank.acceleration_matrix)
+
+
+def left_out_models(
+    fit: GuardedFit,
+    problem: Problem,
+    model: ShipModel,
+    without: Without | None,
+) -> list[ShipModel]:
+    """The models, with covariance, of fits without each of the trials.
+
+    A refined model is fitted again where `without` says how, else less what each trial
+    moved the coefficients of its accelerations by, its `influences`.
+    """
+    n_trials = len(problem.used)
+    if n_trials < FEWEST_TRIALS:
+        return []
+    inflation = n_trials / (n_trials - 1)
+    covariance = inflation * np.asarray(model.covariance)
+    found = []
+    for trial in range(n_trials):
+        if fit.covariance is None:
+            found_by = (fit.estimators, problem.samples, [trial])
+            estimators, rows = without_trials(*found_by)
+            own = with_coefficients(fit.model, estimators)
+            covariance = _of_regression(estimators, rows, problem.blank)
+        elif without is not None:
+            own = without([trial])
+        else:
+            moved = fit.influences[trial].sum(axis=0)
+            change = np.linalg.solve(model.acceleration_matrix, moved)
+            values = np.array(list(model.coefficients.values()))
+            own = model.with_coefficients(values - inflation * change)
+        found.append(replace(own, covariance=covariance))
+    return found
+
+
+def evaluated(
+    model: ShipModel,
+    fit: GuardedFit,
+    problem: Problem,
+    provenance: Mapping[str, Any],
+    options: Options,
+) -> IdentificationResult:
+    """The model with its provenance, diagnostics, and predictions of trials.
+
+    Of all that are not skipped.
+    """
+    trials = tuple(trial for trial in problem.trials if trial.use != "skip")
+    predictions = {trial.name: predict(model, trial) for trial in trials}
+    lost = [name for name, predicted in predictions.items() if predicted is None]
+    complete = dict(provenance)
+    measured = {
+        trial.name: measured_indices(model, trial, predictions[trial.name])
+        for trial in problem.used
+    }
+    complete["measured"] = {
+        name: {index: asdict(value) for index, value in indices.items()}
+        for name, indices in measured.items()
+        if indices
+    }
+    complete["steering"] = "estimated" if options.steering is None else "given"
+    reasons = provenance["guard"].get("rejected", [])
+    if lost:
+        complete |= {"stable": False, "runs_away_on": lost}
+        reasons = [f"trial {name!r}, open loop" for name in lost]
+    stable = complete["stable"]
+    causes = f"runs away: {'; '.join(reasons)}"
+    metrics: dict[str, Any] = {
+        "stable": stable,
+        "instability": None if stable else causes,
+    }
+    bias = rudder_bias(model, problem)
+    if bias is not None:
+        complete["rudder_bias"] = metrics["rudder_bias"] = bias.plain()
+    if "posterior" in complete:
+        metrics["posterior"] = complete["posterior"]
+    model = replace(model, provenance=complete)
+    metrics["trials"] = {
+        trial.name: trial_metrics(model, trial, predictions[trial.name])
+        for trial in trials
+    }
+    return IdentificationResult(
+        model=model,
+        stable=stable,
+        metrics=metrics,
+        predictions=predictions,
+        trials=trials,
+        diagnostics=diagnose(fit.estimators, problem.samples, problem.table),
+        samples=problem.samples,
+        estimators=fit.estimators,
+        settings=whole_call(options, problem.trials),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,10 +324,8 @@ class RegressionFit:
     @property
     def _made_by(self) -> str:
         """Name of the method that made the numbers: the start's, where that stayed."""
-        refinement = self.method.refinement
-        if refinement is None or self.fit.covariance is not None:
-            return self.method.name
-        return get_method(refinement.start).name
+        stayed = self.method.refinement is not None and self.fit.covariance is None
+        return DEFAULT_METHOD if stayed else self.method.name
 
 
 def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationResult:
@@ -97,11 +334,10 @@ def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationRe
     A structure without a constant is fitted again with one where the bias of the rudder
     differs from zero.
     """
-    if options.method_is_default and differentiates_heading(trials, options):
-        options = replace(
-            options,
-            method=_by_heading(trials),
-        )
+    method = options.table_method
+    if options.method is None and differentiates_heading(trials, options):
+        method = _by_heading(trials)
+    options = replace(options, method=method)
     found = fit_regression(trials, options)
     own, fit = with_rudder_bias(found, options)
     return fit.result(own)
@@ -163,7 +399,7 @@ def _refined(
     if method.refinement is None:
         return fit
 
-    from identification.models.refine import refine
+    from identification.models.output_error import refine
 
     memory = MEMORY * problem.blank.travel_time
     return refine(fit, problem, method.refinement, memory, rounds)

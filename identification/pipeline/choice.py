@@ -1,9 +1,15 @@
-"""Structures and methods tried on the same trials, for `structure = "auto"`."""
+"""Routes to a model but for regression: structures compared, kernels, the MMG form."""
 
-from collections.abc import Callable, Sequence
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
+from identification.estimators.kernel_residual import KernelResidual
+from identification.estimators.linear import Estimators
 from identification.judging.selection import (
     RESPONSES,
     RankedFit,
@@ -11,13 +17,39 @@ from identification.judging.selection import (
     rank_by_likelihood,
     simplest,
 )
+from identification.models.guard import GuardedFit, reasons_unstable
+from identification.models.kernel_fit import fit_kernel
+from identification.models.maximum_a_posteriori import (
+    MMGFit,
+    fit_mmg,
+)
+from identification.models.prior_knowledge import PriorKnowledge
 from identification.models.refinement import Refinement, whole_trials
 from identification.models.similarity import with_usual_hull
-from identification.pipeline.by_regression import with_rudder_bias
-from identification.pipeline.options import MAP, Options, name_of
+from identification.pipeline.by_regression import (
+    RegressionFit,
+    by_regression,
+    certain,
+    fit_regression,
+    provenance_of,
+    with_rudder_bias,
+    with_uncertainty,
+)
+from identification.pipeline.options import (
+    AUTO,
+    DEFAULT_METHOD,
+    MAP,
+    Options,
+    name_of,
+    whole_call,
+)
+from identification.pipeline.pose import pose
+from identification.pipeline.result import IdentificationResult, with_provenance
 from identification.progress import counted
-from identification.samples.folds import pieces
-from shipgym import InputError, Trial
+from identification.samples.problem import Problem, pieces
+from shipgym import InputError, ShipModel, Trial
+from shipgym.models.catalogue import fitted_box
+from shipgym.ships import GreyBox, Structure
 from shipgym.ships.structures import GREY_BOX, MMG
 
 TABLES = (
@@ -36,10 +68,6 @@ RM_SVM = "rm-svm"
 REFINED = ("linear-steering", "steering7", "abkowitz", "cubic")
 
 
-#: From trials and options of a structure that is named to its fit.
-FitTrials = Callable[[Sequence[Trial], Options], Any]
-
-
 class Choice(NamedTuple):
     """The structure and method that predict best."""
 
@@ -48,11 +76,7 @@ class Choice(NamedTuple):
     report: dict[str, Any]  # the ranking, for the provenance
 
 
-def select(
-    fit: FitTrials,
-    trials: Sequence[Trial],
-    options: Options,
-) -> Choice:
+def select(trials: Sequence[Trial], options: Options) -> Choice:
     """The structure and method that predict trials left out best.
 
     Every structure that trials and particulars allow is fitted by its usual method, the
@@ -71,12 +95,8 @@ def select(
     if single:
         parts = [part.with_(kind=None) for part in pieces(to_fit[0])]
         held_out = "each third of the only trial"
-    attempts = _Attempts(
-        fit,
-        parts,
-        options,
-    )
-    free = options.method_is_default
+    attempts = _Attempts(parts, options)
+    free = options.method is None
     for structure in counted("structures", STRUCTURES):
         attempts.add(structure, _usual_method(structure, options))
     if not attempts.ranked:
@@ -95,14 +115,14 @@ def select(
     }
     own, whole = attempts.fits[fit_name(best.structure, best.method)]
     if single:
-        whole = fit(trials, own)
+        whole = fitted(trials, own)
     found = Choice(own, whole, report)
     if options.rudder_bias == "none" or best.structure == MMG:
         return found
-    return _with_bias(found, fit, trials)
+    return _with_bias(found, trials)
 
 
-def _with_bias(choice: Choice, fit: FitTrials, trials: Sequence[Trial]) -> Choice:
+def _with_bias(choice: Choice, trials: Sequence[Trial]) -> Choice:
     """The same table with a constant, where it has none and the bias differs from 0.
 
     Of a response by the standard error of the bias in the fit to all trials: in what is
@@ -113,7 +133,7 @@ def _with_bias(choice: Choice, fit: FitTrials, trials: Sequence[Trial]) -> Choic
     if biased not in RESPONSES or not isinstance(options.method, Refinement):
         return Choice(*with_rudder_bias(choice.fit, options), report)
     asked = replace(options, structure=biased)
-    other = fit(trials, asked)
+    other = fitted(trials, asked)
     bias = other.result(asked).metrics.get("rudder_bias")
     report = report | {"rudder_bias": bias}
     if bias is None or not bias["significant"] or not other.stable:
@@ -125,7 +145,6 @@ def _with_bias(choice: Choice, fit: FitTrials, trials: Sequence[Trial]) -> Choic
 class _Attempts:
     """Structures and methods that were tried on the same trials."""
 
-    fit: FitTrials
     trials: Sequence[Trial]
     options: Options
     ranked: list[RankedFit] = field(default_factory=list)
@@ -147,7 +166,7 @@ class _Attempts:
         by = MAP if structure == MMG else name_of(method)
         name = fit_name(structure, by)
         try:
-            found = self.fit(self.trials, own)
+            found = fitted(self.trials, own)
             self.ranked.append(rank_by_likelihood(structure, by, found))
         except InputError as error:
             self.refused[name] = str(error)
@@ -161,8 +180,168 @@ class _Attempts:
 
 def _usual_method(structure: str, options: Options) -> Any:
     """The method that a structure is fitted by: the one that is named, if any."""
-    if options.method_is_default and structure in RESPONSES:
+    if options.method is not None:
+        return options.method
+    if structure in RESPONSES:
         return whole_trials()
-    if options.method_is_default and structure == GREY_BOX:
-        return RM_SVM
-    return options.method
+    return {GREY_BOX: RM_SVM, MMG: MAP}.get(structure, DEFAULT_METHOD)
+
+
+def identified(trials: Sequence[Trial], options: Options) -> IdentificationResult:
+    """Identify by the route that the options ask for."""
+    if options.kernel is not None:
+        return by_kernel(trials, options, options.kernel)
+    if options.structure == AUTO:
+        return by_selection(trials, options)
+    if options.structure == MMG:
+        return by_simulation(trials, options)
+    return by_regression(trials, options)
+
+
+def by_selection(trials: Sequence[Trial], options: Options) -> IdentificationResult:
+    """By the structure and method that predict trials to fit best, each held out."""
+    choice = select(trials, options)
+    best: IdentificationResult = choice.fit.result(choice.options)
+    selection = {"selection": choice.report}
+    return replace(
+        with_provenance(best, selection),
+        metrics=best.metrics | selection,
+        settings=whole_call(options, trials),
+    )
+
+
+def fitted(trials: Sequence[Trial], options: Options) -> RegressionFit | SimulationFit:
+    """The fit of a structure that is named, before its uncertainty and predictions."""
+    if options.structure == MMG:
+        return fit_simulation(trials, options)
+    return fit_regression(trials, options)
+
+
+def by_kernel(
+    trials: Sequence[Trial], options: Options, kernel: KernelResidual
+) -> IdentificationResult:
+    """A reference ship, fitted or named, and a kernel on what she leaves."""
+    if options.uncertainty.by_sampling:
+        raise InputError(
+            "uncertainty: expected 'analytic' with a kernel, got 'posterior'; leave"
+            " one of them out"
+        )
+    method = name_of(options.table_method)
+    by_lssvm = ("tls-svm", "ls-svm", "rm-svm")
+    if options.structure == GREY_BOX and method not in by_lssvm:
+        raise InputError(
+            "method: expected none with a kernel on a grey box, which is fitted by"
+            f" LS-SVM, got {method!r}; leave it out"
+        )
+    beneath = replace(options, kernel=None)
+    problem = pose(trials, beneath)
+    _check_beneath(problem.table)
+    reference = problem.blank
+    box = problem.table
+    if not isinstance(box, GreyBox):
+        reference = identified(trials, beneath).model
+        box = fitted_box(reference)
+    found = fit_kernel(kernel, reference, problem, box)
+    problem = replace(
+        problem,
+        blank=found.model,
+        table=found.model.table,
+        samples=found.samples,
+    )
+    reasons = reasons_unstable(found.model, problem.used)
+    fit = _guard_report(found.model, found.estimators, reasons)
+    provenance = provenance_of(options, method, fit, problem)
+    provenance["kernel"] = found.report
+    return with_uncertainty(fit, problem, provenance, options)
+
+
+def _check_beneath(table: Structure) -> None:
+    """Refuse a structure that cannot take a kernel."""
+    if set(table.equations) != set("uvr"):
+        raise InputError(
+            "kernel: expected a structure beneath it with equations of u, v and r, got"
+            f" {table.name!r} with those of {', '.join(table.equations)}; choose"
+            " 'linear' or 'abkowitz', or leave the kernel out"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class SimulationFit:
+    """The MMG form, and what it would be without some trials."""
+
+    problem: Problem
+    fit: MMGFit
+
+    @property
+    def model(self) -> ShipModel:
+        """The model of all trials."""
+        return self.fit.model
+
+    @property
+    def free_coefficients(self) -> int:
+        """Number of coefficients that the trials, and not the prior, determine."""
+        return self.fit.free_coefficients
+
+    @cached_property
+    def reasons(self) -> list[str]:
+        """Simulations in which the model of all trials runs away."""
+        return reasons_unstable(self.model, self.problem.used)
+
+    @property
+    def stable(self) -> bool:
+        """Whether the model of all trials passes the guard."""
+        return not self.reasons
+
+    def without(self, trials: Sequence[int]) -> ShipModel:
+        """The model of the other trials, by their places."""
+        return self.fit.without(trials)
+
+    def result(self, options: Options) -> IdentificationResult:
+        """The model with provenance and predictions."""
+        options = checked_mmg(options)
+        model = self.model
+        problem = replace(self.problem, blank=model)
+        fit = _guard_report(model, {}, self.reasons)
+        provenance = provenance_of(options, MAP, fit, problem) | deepcopy(
+            self.fit.report
+        )
+        prior = self.fit.prior
+        return certain(model, fit, problem, provenance, options, self.without, prior)
+
+
+def by_simulation(trials: Sequence[Trial], options: Options) -> IdentificationResult:
+    """The MMG form by its simulation error."""
+    return fit_simulation(trials, options).result(options)
+
+
+def fit_simulation(trials: Sequence[Trial], options: Options) -> SimulationFit:
+    """The fit of `by_simulation`, before its predictions."""
+    options = checked_mmg(options)
+    problem = pose(trials, options)
+    asked = options.prior or PriorKnowledge()
+    return SimulationFit(problem, fit_mmg(problem.blank, problem.used, asked))
+
+
+def checked_mmg(options: Options) -> Options:
+    """The options of an identification of the MMG form.
+
+    Raises InputError for those that it does not have.
+    """
+    if options.method is not None and options.method != MAP:
+        raise InputError(
+            "method: expected none with structure 'mmg', got"
+            f" {name_of(options.method)!r}; it is not linear in its coefficients and is"
+            " fitted by simulation error with a prior: leave the method and its"
+            " settings out, or choose another structure"
+        )
+    return replace(options, method=MAP)
+
+
+def _guard_report(
+    model: ShipModel, estimators: Estimators, reasons: list[str]
+) -> GuardedFit:
+    """A fit that was not guarded, and the simulations in which it runs away."""
+    report: dict[str, Any] = {"decision": "stable as fitted"}
+    if reasons:
+        report = {"decision": "runs away", "rejected": reasons}
+    return GuardedFit(model, estimators, not reasons, report)

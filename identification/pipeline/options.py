@@ -10,13 +10,21 @@ import shipgym
 from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.linear import LinearRegressor
 from identification.judging.uncertainty import Uncertainty
+from identification.models.methods import METHODS, make_method, method_options
 from identification.models.prior_knowledge import PriorKnowledge
 from identification.models.refinement import Refinement
 from identification.samples.preprocess import Preprocessing
 from identification.samples.samples import Sampling
 from identification.samples.still_water import check_current, check_wind
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
-from shipgym.checks import check_choice, check_flag, check_number, check_text
+from shipgym.checks import (
+    check_choice,
+    check_flag,
+    check_number,
+    check_table,
+    check_text,
+    did_you_mean,
+)
 from shipgym.ships import Structure
 from shipgym.ships.structures import GREY_BOX, MMG
 
@@ -48,8 +56,10 @@ class Options:
         Terms of the model: a name of `shipgym.list_structures`, a table, or "auto": the
         structure and method that predict held-out trials best. None is "abkowitz", with
         a kernel "grey-box".
-    method : str or estimator
-        How the coefficients are fitted: a name of
+    method : str, estimator or None
+        How the coefficients are fitted. None is "tls-svm" for a table of terms, the
+        only method of "mmg", and the one that suits it for each structure that "auto"
+        tries. Otherwise a name of
         `identification.models.methods.METHODS`, such as "tls-svm", an estimator
         such as `TruncatedLSSVM(rank=12)`, a `Refinement`, or any object with
         scikit-learn's interface, `fit(X, y)` that sets `coef_`, of which each equation
@@ -86,8 +96,6 @@ class Options:
     rudder_bias : {"auto", "none"}
         "auto": a structure without a constant gets one where the bias of the rudder
         differs from zero; "none": it stays as it is.
-    hold_out : sequence of str
-        Trials, by name, that are only predicted, as if they were marked validate.
     guarded : bool
         Whether a model that runs away in a hard turn is fitted again, with the weakest
         sufficient penalty on terms that are large there and invisible in the data.
@@ -98,7 +106,7 @@ class Options:
     """
 
     structure: str | Structure | None = None
-    method: Any = DEFAULT_METHOD
+    method: Any = None
     samples: Any = "spline"  # a Sampling once made, and so with the other stages
     particulars: Given = None
     steering: SteeringGear | None = None
@@ -111,7 +119,6 @@ class Options:
     current: str | Mapping[str, float] = "auto"
     wind: str | Mapping[str, Any] = "auto"
     rudder_bias: str = "auto"
-    hold_out: str | Sequence[str] = ()
     guarded: bool = True
     name: str | None = None
     service_shaft_speed: float | None = None
@@ -150,10 +157,6 @@ class Options:
                 " out, or choose 'mmg' or 'auto'"
             )
         check_flag(self.guarded, "guarded")
-        if not isinstance(self.hold_out, Sequence):
-            raise InputError(
-                f"hold_out: expected a list of names of trials, got {self.hold_out!r}"
-            )
         if self.name is not None:
             check_text(self.name, "name")
         speed = self.service_shaft_speed
@@ -161,9 +164,9 @@ class Options:
             check_number(speed, "service_shaft_speed", above=0.0, hint="1/s")
 
     @property
-    def method_is_default(self) -> bool:
-        """Whether no method was asked for."""
-        return isinstance(self.method, str) and self.method == DEFAULT_METHOD
+    def table_method(self) -> Any:
+        """The method of a table of terms: the one that is named, if any."""
+        return DEFAULT_METHOD if self.method is None else self.method
 
 
 def name_of(value: Any) -> str:
@@ -215,3 +218,115 @@ def plain(value: Any) -> Any:
     if is_dataclass(value):
         return settings_of(value, [item.name for item in fields(value)])
     return repr(value)
+
+
+#: The setting of each stage that its name alone stands for.
+WORDS = {name: fields(kind)[0].name for name, kind in STAGES.items()}
+WORDS["method"] = "name"
+#: Arguments of `identify` that are no stage, and come from such a table.
+ARGUMENTS = tuple(
+    item.name
+    for item in fields(Options)
+    if item.name not in (*WORDS, "particulars", "steering")
+)
+
+
+def stage_settings() -> dict[str, list[str]]:
+    """Names of the settings of each stage but for the one that its name stands for."""
+    found = {
+        stage: [item.name for item in fields(kind)][1:]
+        for stage, kind in STAGES.items()
+    }
+    of_methods = [option for method in METHODS for option in method_options(method)]
+    found["method"] = list(dict.fromkeys(of_methods))
+    return found
+
+
+def option_names() -> dict[str, str]:
+    """Full names of options by every name that they may be given."""
+    found: dict[str, str] = {}
+    for stage, settings in stage_settings().items():  # the method comes last
+        found |= {setting: f"{stage}.{setting}" for setting in settings}
+        found |= {f"{stage}.{setting}": f"{stage}.{setting}" for setting in settings}
+        found[f"{stage}.{WORDS[stage]}"] = stage
+    return found | {name: name for name in (*ARGUMENTS, *WORDS)}
+
+
+def read_table(table: Any, where: str) -> dict[str, Any]:
+    """Values of a table of options by their full names.
+
+    Parameters
+    ----------
+    table : mapping
+        Values by name; a stage may be a table of its settings.
+    where : str
+        Begins messages, such as ``"ship.toml: [identify]"``.
+
+    Raises
+    ------
+    InputError
+        For an unknown option.
+    """
+    known = option_names()
+    found: dict[str, Any] = {}
+    for name, value in check_table(
+        table,
+        where,
+    ).items():
+        own = {name: value}
+        if name in WORDS and isinstance(value, Mapping):
+            own = {f"{name}.{setting}": one for setting, one in value.items()}
+        for option, one in own.items():
+            if option not in known:
+                alone = ", ".join(name for name in known if "." not in name)
+                raise InputError(
+                    f"{where} {option}: expected an option of identify, got an unknown"
+                    f" one.{did_you_mean(option, known) or f' There are {alone}.'}"
+                )
+            found[known[option]] = one
+    return found
+
+
+def identify_arguments(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of `identify` from options by their full names.
+
+    Raises InputError for values that they cannot have, and for options that do not
+    belong together.
+    """
+    arguments = {name: values[name] for name in ARGUMENTS if name in values}
+    for stage, kind in STAGES.items():
+        settings = _settings_of(values, stage)
+        if stage == "kernel" and settings and "kernel" not in values:
+            raise InputError(
+                f"{', '.join(settings)}: expected a kernel that this is a setting of,"
+                ' got none; give kernel = "rbf"'
+            )
+        if stage in values:
+            settings[WORDS[stage]] = values[stage]
+        if settings:
+            arguments[stage] = kind(**settings)
+
+    if "method" in values:
+        arguments["method"] = check_choice(
+            values["method"],
+            (*METHODS, MAP),
+            "method",
+        )
+    settings = _settings_of(values, "method")
+    if settings:
+        made = make_method(arguments.get("method", DEFAULT_METHOD), settings)
+        if not isinstance(made, Refinement):
+            made.check()
+        arguments["method"] = made
+    Options(**arguments)
+    return arguments
+
+
+def _settings_of(values: Mapping[str, Any], stage: str) -> dict[str, Any]:
+    """The settings of a stage among options by their full names."""
+    prefix = f"{stage}."
+    return {
+        name.removeprefix(prefix): value
+        for name, value in values.items()
+        if name.startswith(prefix)
+    }

@@ -110,7 +110,7 @@ def _table(
     """The structure; for a grey box also the similarity of the candidates."""
     structure, reference = options.structure, options.reference_model
     if structure == GREY_BOX:
-        from identification.models.grey_box import chosen_box
+        from identification.models.similarity import chosen_box
 
         steering = get_structure("linear-steering")
         check_trials(used, steering)

@@ -12,28 +12,224 @@ All quantities of the simulation are in units of the ship's length and service s
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from identification.least_squares import Linearised, fit_least_squares
-from identification.samples.runs_on_grid import (
-    STEP,
-    Runs,
-    trials_on_one_grid,
-    window_means,
-)
-from identification.samples.surge_sway import (
-    DEVIATION,
-    MEAN,
-    N_COEFFICIENTS,
-    SurgeSwayInputs,
-    accelerations,
-)
 from shipgym import Trial
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, integral
+from shipgym.models.simulate import wind_accelerations
+from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.navigation import rotate_to_body
+
+#: Probability of a current as large by chance below which it differs from zero.
+SIGNIFICANT = 0.01
+CURRENT_COLUMNS = ("current_north", "current_east")
+
+
+def over_ground(trial: Trial) -> tuple[Floats, Floats]:
+    """Velocity of midship over ground, ahead and to starboard, m/s.
+
+    The trial has velocities over ground, or one of them derived from its track.
+    """
+    derived = {"u", "v"} & trial.derived
+    if len(derived) != 1:
+        return trial["u"], trial["v"]
+
+    # the other one was logged, and is through the water
+    north = time_derivative(trial.t, trial["x"])
+    east = time_derivative(trial.t, trial["y"])
+    return rotate_to_body(north, east, trial["psi"])
+
+
+def through_water(trial: Trial, north: Any, east: Any) -> Trial:
+    """The trial without a current, m/s, each a number or of shape (n_samples,).
+
+    Its track starts where it did; velocities over ground, but for one logged, become
+    those through the water.
+    """
+    t = trial.t
+    north = np.full(len(t), north, dtype=float)
+    east = np.full(len(t), east, dtype=float)
+    channels = {"current_north": north, "current_east": east}
+    if "x" in trial:
+        channels["x"] = trial["x"] - integral(t, north)
+    if "y" in trial:
+        channels["y"] = trial["y"] - integral(t, east)
+
+    if trial.over_ground and trial.channels.keys() >= {"u", "v", "psi"}:
+        ahead, aside = over_ground(trial)
+        drift_ahead, drift_aside = rotate_to_body(north, east, trial["psi"])
+        derived = trial.derived & {"u", "v"}
+        over = derived or {"u", "v"}  # one derived alone: the other was logged
+        if "u" in over:
+            channels["u"] = ahead - drift_ahead
+        if "v" in over:
+            channels["v"] = aside - drift_aside
+    still = trial.with_channels(channels)
+    return still.with_(over_ground=False)
+
+
+#: Mean and standard deviation of the coefficients before any trial, in the order of the
+#: terms of `accelerations`: those of surge, those of sway, and that of the wind.
+PRIOR = (
+    (0.0, 0.02),
+    (-0.10, 0.2),
+    (-0.05, 0.2),
+    (0.9, 0.6),
+    (-0.5, 1.5),
+    (0.0, 0.3),
+    (-0.03, 0.15),
+    (-0.03, 0.15),
+    (0.0, 0.02),
+    (-0.9, 0.6),
+    (-3.0, 4.0),
+    (-0.35, 0.25),
+    (0.0, 0.5),
+    (-0.5, 1.5),
+    (0.0, 1.5),
+    (-0.06, 0.1),
+    (-0.04, 0.1),
+    (1.0, 0.25),
+)
+MEAN, DEVIATION = np.array(PRIOR).T
+N_COEFFICIENTS = len(PRIOR)
+
+
+def accelerations(u: Any, v: Any, at: Floats, coefficients: Floats) -> tuple[Any, Any]:
+    """Surge and sway acceleration by quadratic equations of any ship.
+
+    `at`: what moves her, as of `Runs.inputs`.
+    """
+    r, delta, n, ahead, aside = at
+    terms = (
+        1.0,
+        u - n,
+        u**2 - n**2,
+        v * r,
+        v**2,
+        r**2,
+        delta**2,
+        u**2 * delta**2,
+        1.0,
+        u * v,
+        v * abs(v),
+        u * r,
+        r * abs(r),
+        v * abs(r),
+        r * abs(v),
+        u**2 * delta,
+        delta,
+    )
+    *others, wind = coefficients
+    parts = [c * term for c, term in zip(others, terms, strict=True)]
+    of_surge = 8
+    surge = sum(parts[:of_surge]) + wind * ahead
+    return surge, sum(parts[of_surge:]) + wind * aside
+
+
+STEP = 0.2  # of the grid, in the time to sail one ship length
+STEPS = 5  # in a window, over which velocities are averaged
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """Trials on one grid of time; a shorter one stays at its last sample.
+
+    In units of the ship's length and service speed.
+    """
+
+    #: yaw rate, rudder, shaft speed by that at the start, and accelerations by wind
+    #: ahead and aside, shape (n_times, 5, n_trials)
+    inputs: Floats
+    psi: Floats  # shape (n_times, n_trials)
+    #: velocities north and east over ground, and ahead through the water; means over
+    #: windows of time, NaN where not measured, shape (n_windows, 3, n_trials)
+    seen: Floats
+
+    @property
+    def n_trials(self) -> int:
+        """Number of trials."""
+        return len(self.psi[0])
+
+
+def trials_on_one_grid(trials: Sequence[Trial], length: float, speed: float) -> Runs:
+    """The trials on one grid, in units of length and service speed."""
+    travel_time = length / speed
+    times = [(trial.t - trial.t[0]) / travel_time for trial in trials]
+    longest = max(t[-1] for t in times)
+    window = STEP * STEPS
+    n_steps = int(longest / window) * STEPS
+    grid: Floats = np.arange(n_steps + 1, dtype=np.float64) * STEP
+    shaft_speed = _starting_shaft_speed(trials)
+
+    inputs, headings, seen = [], [], []
+    for trial, t in zip(trials, times, strict=True):
+        moved_by = _inputs(
+            trial,
+            travel_time,
+            speed,
+            shaft_speed,
+        )
+        inputs.append(_on_grid(grid, t, moved_by))
+        headings.append(np.interp(grid, t, trial["psi"]))
+        velocities = _on_grid(grid, t, _seen(trial, speed))
+        velocities[grid > t[-1]] = np.nan
+        seen.append(velocities)
+    return Runs(
+        inputs=np.stack(inputs, axis=-1),
+        psi=np.stack(headings, axis=-1),
+        seen=window_means(np.stack(seen, axis=-1)),
+    )
+
+
+def _inputs(
+    trial: Trial, travel_time: float, speed: float, shaft_speed: float | None
+) -> Sequence[Floats]:
+    """What moves the ship, arrays of shape (n_samples,)."""
+    wind = wind_accelerations(trial) * travel_time / speed
+    shaft = np.ones(len(trial))
+    if shaft_speed is not None:
+        shaft = trial["n"] / shaft_speed
+    return trial["r"] * travel_time, trial["delta"], shaft, *wind.T[:2]
+
+
+def _seen(trial: Trial, speed: float) -> tuple[Floats, Floats, Floats]:
+    """Velocity north and east over ground, and ahead through the water if logged."""
+    ahead, aside = over_ground(trial)
+    to_earth = -trial["psi"]
+    north, east = rotate_to_body(
+        ahead,
+        aside,
+        to_earth,
+    )
+    logged = np.full(len(trial), np.nan)
+    if "v" in trial.derived and "u" not in trial.derived:
+        logged = trial["u"]
+    return north / speed, east / speed, logged / speed
+
+
+def _on_grid(grid: Floats, t: Floats, rows: Sequence[Floats]) -> Floats:
+    """Rows of samples at the times of the grid, shape (n_times, n_rows)."""
+    columns = [np.interp(grid, t, row) for row in rows]
+    return np.column_stack(columns)
+
+
+def _starting_shaft_speed(trials: Sequence[Trial]) -> float | None:
+    """Median shaft speed at the start, 1/s; None where not all trials turn ahead."""
+    if not all("n" in trial and trial["n"][0] > 0.0 for trial in trials):
+        return None
+    return float(np.median([trial["n"][0] for trial in trials]))
+
+
+def window_means(values: Floats) -> Floats:
+    """Means over the windows of the grid, whose times are the first axis."""
+    windows = values[:-1].reshape(-1, STEPS, *values.shape[1:])
+    return np.asarray(windows.mean(axis=1))
+
 
 DIFFERENCE = 1e-4  # of finite differences
 
@@ -152,16 +348,10 @@ class _Problem:
         deviations = x[:, :N_COEFFICIENTS]
         c = (MEAN + deviations * DEVIATION).T[:, :, None]
         u, v = np.moveaxis(x[:, self.start_columns], -1, 0)
-        u = u + SurgeSwayInputs(*self.runs.inputs[0]).n
+        u = u + self.runs.inputs[0, 2]
         surge, sway = [u], [v]
         for now, then in pairwise(self.runs.inputs):
-            u, v = _midpoint_step(
-                u,
-                v,
-                now,
-                then,
-                c,
-            )
+            u, v = _midpoint_step(u, v, now, then, c)
             surge.append(u)
             sway.append(v)
         return np.array(surge), np.array(sway)
@@ -214,19 +404,13 @@ class _Problem:
 
 
 def _midpoint_step(
-    u: Floats,
-    v: Floats,
-    now: Floats,
-    then: Floats,
-    c: Floats,
+    u: Floats, v: Floats, now: Floats, then: Floats, c: Floats
 ) -> tuple[Floats, Floats]:
     """One step of the midpoint rule, kept within what a ship does."""
-    at_start = SurgeSwayInputs(*now)
-    surge, sway = accelerations(u, v, at_start, c)
-    half = SurgeSwayInputs(*(0.5 * (now + then)))
+    surge, sway = accelerations(u, v, now, c)
     u_half = u + 0.5 * STEP * surge
     v_half = v + 0.5 * STEP * sway
-    surge, sway = accelerations(u_half, v_half, half, c)
+    surge, sway = accelerations(u_half, v_half, 0.5 * (now + then), c)
     u = u + STEP * surge
     v = v + STEP * sway
     return np.clip(u, -2.0, 3.0), np.clip(v, -2.0, 2.0)

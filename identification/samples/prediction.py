@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.samples.preprocess import is_noisy, outliers
-from identification.samples.preprocess.noise import noise_level
+from identification.samples.preprocess import is_noisy, noise_level, outliers
 from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.models.simulate import first_state, open_loop, open_loop_states

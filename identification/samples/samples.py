@@ -15,7 +15,6 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.samples.gaps import FEWEST_SAMPLES, between_gaps
 from identification.samples.integrals import (
     Channels,
     spline_integrals,
@@ -23,7 +22,9 @@ from identification.samples.integrals import (
     twice_integrated,
 )
 from identification.samples.preprocess import (
+    FEWEST_SAMPLES,
     NOISY,
+    between_gaps,
     is_noisy,
     noise_ratio,
     smoothed_channels,

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
 from identification.arrays import root_mean_square
-from identification.estimators.estimator import Estimator
+from identification.estimators.linear import Estimator
 from shipgym.arrays import integral
 from shipgym.models import ShipModel
 from shipgym.ships.inertia import inertia

@@ -17,8 +17,8 @@ from identification.estimators.linear import validated
 from identification.models.similarity import select_reference
 from identification.pipeline import identify
 from identification.pipeline.result import IdentificationResult
-from identification.samples.folds import LARGEST_RUDDER
 from identification.samples.prediction import predict
+from identification.samples.problem import LARGEST_RUDDER
 from identification.samples.samples import build_samples
 from papers.row import sampled
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices

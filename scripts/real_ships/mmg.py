@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from identification import PriorKnowledge
-from identification.judging.closed_loop import closed_loop
+from identification.judging.prediction import closed_loop
 from identification.pipeline import identify
 from real_ships.data import Data, MeasuredShip
 from real_ships.marin import SHIP as MARIN

@@ -13,7 +13,6 @@ from sensors import Sensors
 import shipgym
 from agents.verification.chain import build_autopilot
 from identification import (
-    ArtificialBeeColony,
     RecursiveLeastSquares,
     TruncatedLSSVM,
     TunedLSSVM,
@@ -57,9 +56,7 @@ def bee_colony_search(objective: str, n_samples: int = 1800, n_terms: int = 7) -
 
     def least(n: int) -> float:
         X, y = made_up_regression(n, n_terms)
-        machine = TunedLSSVM(
-            optimiser=ArtificialBeeColony(20, 30, 20), objective=objective
-        )
+        machine = TunedLSSVM(optimiser="abc", objective=objective)
         return best_time(lambda: machine.fit(X, y), 50)
 
     once, tenfold = least(n_samples), least(10 * n_samples)

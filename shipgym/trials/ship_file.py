@@ -194,7 +194,7 @@ class ShipFile:
         None where ``[steering]`` gives nothing.
     identify : dict
         Options of the identification as they stand in ``[identify]``, the table
-        ``[wind]`` among them; `identification.pipeline.reading` checks them.
+        ``[wind]`` among them; `identification.pipeline.options` checks them.
     entries : tuple of TrialEntry
         The trials, not read yet.
     structure : Structure or None

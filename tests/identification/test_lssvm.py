@@ -10,7 +10,6 @@ from sklearn.utils.estimator_checks import check_estimator
 
 from identification import (
     LSSVM,
-    ArtificialBeeColony,
     LeastSquares,
     RidgeRegression,
     TruncatedLSSVM,
@@ -38,7 +37,7 @@ def regression(
         LSSVM(),
         TruncatedLSSVM(),
         TunedLSSVM(optimiser="grid"),
-        TunedLSSVM(optimiser=ArtificialBeeColony(rounds=3)),
+        TunedLSSVM(optimiser={"name": "abc", "rounds": 3}),
         LeastSquares(),
         RidgeRegression(),
     ],

@@ -15,7 +15,7 @@ from identification import (
     TruncatedLSSVM,
     identify,
 )
-from identification.models.mmg_prior import mmg_prior, reference_coefficients
+from identification.models.maximum_a_posteriori import mmg_prior, reference_coefficients
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.engine.motion import Motion, Ship
 from shipgym.manoeuvres import turning_circle, turning_indices

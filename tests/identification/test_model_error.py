@@ -16,8 +16,8 @@ from identification import (
     identify,
     predict,
 )
-from identification.judging.closed_loop import closed_loop
 from identification.judging.model_error import with_sound_draws
+from identification.judging.prediction import closed_loop
 from identification.judging.warnings import held_out_error
 from shipgym import ShipModel, Trial
 from shipgym.manoeuvres import zigzag, zigzag_indices
@@ -56,7 +56,7 @@ def test_the_covariance_in_the_model_is_the_scaled_one(
         scaled.model.covariance, error["factor"] ** 2 * bare.model.covariance
     )
     assert "model_error" not in bare.model.provenance
-    assert "model error" in scaled.summary()
+    assert "multiplied by" in scaled.summary()
 
 
 def test_closed_loop_overshoots_do_not_depend_on_the_neutral_helm(

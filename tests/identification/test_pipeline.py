@@ -173,7 +173,6 @@ def test_result_is_saved_whole_and_read_back(
         ({"name": " "}, "name: "),
         ({"service_shaft_speed": 0.0}, "service_shaft_speed: "),
         ({"steering": 3.0}, r"steering: .*3.0"),
-        ({"hold_out": ["turn"]}, r"hold_out: .*'zigzag_15_15'"),
         ({"reference_model": "kvlcc2"}, r"reference_model: .*'abkowitz'.*'kvlcc2'"),
         ({"structure": "grey-box", "reference_model": 3}, r"reference_model: .*3"),
     ],

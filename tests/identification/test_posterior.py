@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from sensors import Sensors
 
 from identification import Uncertainty, identify
-from identification.judging.posterior import with_posterior
-from identification.judging.sampling import mixing_of
+from identification.judging.posterior import mixing_of
 from identification.judging.warnings import model_warnings
-from identification.models.sailed import CoefficientPrior
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
 
@@ -106,20 +102,6 @@ def test_walkers_that_do_not_mix_leave_the_covariance():
     stuck = np.tile(moving[0], (100, 1, 1))
     assert not mixing_of(stuck).is_enough
     assert not mixing_of(moving + np.linspace(0.0, 3.0, 100)[:, None, None]).is_enough
-
-
-def test_a_prior_that_trials_contradict_is_named(result, trials):
-    """The first coefficient is expected where it is not, to a hundredth."""
-    model = result.model
-    mean = np.array(list(model.coefficients.values()))
-    off = mean * [1.5, 1.0]
-    prior = CoefficientPrior("a guess", off, np.diag(np.abs(mean) * [0.01, 0.5]))
-    asked = Uncertainty("posterior", steps=100)
-    _, report = with_posterior(replace(model, draws=None), trials, prior, asked)
-    (remark,) = report["remarks"]
-    name = next(iter(model.coefficients))
-    assert remark.startswith("prior: expected coefficients within 3 standard")
-    assert f"(a guess), got {name}" in remark
 
 
 def test_a_posterior_is_not_for_a_kernel(nomoto, trials):

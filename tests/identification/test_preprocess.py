@@ -5,11 +5,11 @@ import pytest
 from scipy.interpolate import make_smoothing_spline
 
 from identification.samples.preprocess import (
+    Reinsch,
     noise_level,
     repaired,
     smooth,
 )
-from identification.samples.preprocess.splines import Reinsch
 from shipgym import Trial
 
 

@@ -17,7 +17,7 @@ from identification import (
     TruncatedLSSVM,
     Uncertainty,
 )
-from identification.pipeline.reading import (
+from identification.pipeline.options import (
     identify_arguments,
     read_table,
 )
@@ -52,7 +52,6 @@ def read(table: dict[str, Any]) -> dict[str, Any]:
         ),
         ({"structure": "nomoto"}, "structure", "nomoto"),
         ({"method": "ls"}, "method", "ls"),
-        ({"hold_out": ["a.csv"]}, "hold_out", ["a.csv"]),
         (
             {"current": {"north": 0.1, "east": 0.2}},
             "current",
@@ -79,10 +78,10 @@ def test_settings_are_those_of_the_method_that_is_named() -> None:
     named = read({"method": "ls-svm", "scale": False, "method.C": 3.0})["method"]
     assert isinstance(named, LSSVM)
     assert (named.scale, named.C) == (False, 3.0)
-    table = {"name": "output-error", "pull": 0.1, "rank": 3}
+    table = {"name": "output-error", "pull": 0.1}
     refined = read({"method": table})["method"]
     assert isinstance(refined, Refinement)
-    assert (refined.pull, refined.start.rank) == (0.1, 3)
+    assert refined.pull == 0.1
 
 
 @pytest.mark.parametrize(
@@ -103,7 +102,6 @@ def test_settings_are_those_of_the_method_that_is_named() -> None:
             r"optimiser: .*round",
         ),
         ({"method": "pso-lssvr", "seed": -1}, "seed: "),
-        ({"hold_out": 3}, r"hold_out: .*a list of names"),
         ({"foo": 1}, r"foo: .*There are .*window.*rank"),
         ({"structure": 3}, r"structure: .*3"),
         ({"name": " "}, "name: "),
@@ -112,7 +110,6 @@ def test_settings_are_those_of_the_method_that_is_named() -> None:
         ({"strength": -1.0}, r"prior\.strength: "),
         ({"centres": 101}, "centres: "),
         ({"model_error": "no"}, "model_error: "),
-        ({"method": "output-error", "staggered": "x"}, r"staggered: .*'x'"),
     ],
 )
 def test_a_wrong_option_is_named_with_its_place(

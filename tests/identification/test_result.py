@@ -16,12 +16,11 @@ from matplotlib.figure import Figure
 from identification import (
     IdentificationResult,
     identify,
-    plots,
     write_report,
 )
 from identification.judging.warnings import held_out_error
 from identification.pipeline.result import FILES
-from identification.report.page import report_page
+from identification.report.view import report_page
 from shipgym import InputError, ShipFile, ShipModel, Trial
 from shipgym.pages import fixed
 
@@ -34,7 +33,6 @@ ship = ShipFile.load("examples/mariner/ship.toml")
 result = identify(
     ship.trials(), method="abc-lssvr",
     particulars=ship.particulars, steering=ship.steering,
-    hold_out=["zigzag_10_10.csv"],
 )
 result.save(sys.argv[1])
 write_report(result, sys.argv[1])
@@ -64,12 +62,11 @@ def test_the_same_call_on_the_same_data_writes_the_same_bytes(tmp_path: Path) ->
     environment = os.environ | {"PYTHONHASHSEED": "1", "PYTHONPATH": str(ROOT)}
     subprocess.run(command, cwd=ROOT, env=environment, check=True)
     ship = ShipFile.load(ROOT / "examples" / "mariner" / "ship.toml")
-    settings = {
-        "method": "abc-lssvr",
-        "hold_out": ["zigzag_10_10.csv"],
-    }
     result = identify(
-        ship.trials(), particulars=ship.particulars, steering=ship.steering, **settings
+        ship.trials(),
+        method="abc-lssvr",
+        particulars=ship.particulars,
+        steering=ship.steering,
     )
     result.save(tmp_path / "here")
     write_report(result, tmp_path / "here")
@@ -96,15 +93,6 @@ def test_settings_hold_the_whole_call(
         "fit",
         "validate",
     ]
-
-
-def test_figures_by_name(
-    truncated: IdentificationResult, searched: IdentificationResult
-) -> None:
-    held = f"prediction: {truncated.trials[-1].name}"
-    common = {"trials", held}
-    assert plots(truncated).keys() == common | {"l-curve"}
-    assert plots(searched).keys() == common
 
 
 def test_the_report_shows_trials_coefficients_and_figures(

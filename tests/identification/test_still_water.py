@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification import Uncertainty, identify
-from identification.judging.sentences import sea_sentences
+from identification.judging.warnings import sea_sentences
 from identification.samples.still_water import in_still_water
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.estimators.estimator import Estimator
+from identification.estimators.linear import Estimator
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.tuned import TunedLSSVM
 from identification.samples.samples import build_samples
