@@ -353,4 +353,8 @@ def reduced_structure(
         for q, names in kept.items()
     }
     source = f"{structure.source}; reduced"
-    return replace(structure, source=source, equations=equations)
+    return replace(
+        structure,
+        source=source,
+        equations=equations,
+    )

@@ -49,5 +49,6 @@ def _inverse_moment(features: Floats, is_used: Flags) -> Floats:
     """That of least squares on the features in use."""
     used = features[:, is_used]
     inverse = np.zeros((len(is_used), len(is_used)))
-    inverse[np.ix_(is_used, is_used)] = np.linalg.pinv(used.T @ used, hermitian=True)
+    among_used = np.ix_(is_used, is_used)
+    inverse[among_used] = np.linalg.pinv(used.T @ used, hermitian=True)
     return inverse

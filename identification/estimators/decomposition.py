@@ -61,7 +61,8 @@ class Decomposition:
         s = self.singular_values
         largest_side = max(self.n_samples, len(self.scale))
         rounding = largest_side * np.finfo(float).eps * s[0]
-        return max(int(np.sum(s > rounding)), 1)
+        n_above = np.sum(s > rounding)
+        return max(int(n_above), 1)
 
     def filters(self, C: float) -> Floats:
         """Factors s / (s^2 + 1/C) of directions, 0 below rounding."""

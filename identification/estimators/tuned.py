@@ -158,13 +158,13 @@ def check_optimiser(optimiser: str | Mapping[str, Any]) -> tuple[str, dict[str, 
     """Name and settings of an optimiser: a name, or `{"name": "abc", "rounds": 60}`."""
     table = optimiser if isinstance(optimiser, Mapping) else {"name": optimiser}
     name = check_choice(table.get("name"), OPTIMISERS, "optimiser")
-    known = inspect.signature(OPTIMISERS[name]).parameters
-    check_keys(table, ("name", *[one for one in known if one != "search"]), "optimiser")
-    return name, {
-        key: check_whole(value, key, at_least=1, at_most=100_000)
-        for key, value in table.items()
-        if key != "name"
-    }
+    _, *known = inspect.signature(OPTIMISERS[name]).parameters
+    check_keys(table, ("name", *known), "optimiser")
+    settings = {}
+    for key in known:
+        if key in table:
+            settings[key] = check_whole(table[key], key, at_least=1, at_most=100_000)
+    return name, settings
 
 
 def minimised(

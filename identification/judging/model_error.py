@@ -151,7 +151,8 @@ def scale_of(errors: Sequence[PredictionError]) -> float:
         expected = np.exp(2.0 * log_factor) * variance + noise
         return float(np.mean(square / expected)) - 1.0
 
-    least, largest = np.log(1e-3), np.log(1e3)
+    least = np.log(1e-3)
+    largest = np.log(1e3)
     if excess(least) <= 0.0:
         return 1e-3
     if excess(largest) >= 0.0:
@@ -232,8 +233,10 @@ def _with_noisy_rudder(own: ShipModel, clean: Trial) -> list[Trial]:
     smallest = math.radians(0.01)
     if level < smallest or "r" not in clean.derived:
         return []
-    noise = level * np.random.default_rng(0).standard_normal((RUDDERS, len(delta)))
-    return _runs([(own, clean.with_channels({"delta": delta + e})) for e in noise])
+    rng = np.random.default_rng(0)
+    noise = level * rng.standard_normal((RUDDERS, len(delta)))
+    noisy = [clean.with_channels({"delta": delta + error}) for error in noise]
+    return _runs([(own, trial) for trial in noisy])
 
 
 def _robust_variance(scatter: Floats) -> Floats:
@@ -385,12 +388,17 @@ def _mean_square(
         name, degree = ("psi", 1) if "psi" in trial else ("r", 0)
         error = run[name] - trial[name]
         both = np.column_stack([error, trial[name]])
-        powers = np.vander(trial.t - trial.t[0], degree + 1)
-        slopes, *_ = np.linalg.lstsq(powers, both)
-        left, scatter = column_rms(both - powers @ slopes)
+        left, scatter = _rms_without_drift(trial.t, both, degree)
         size = left if without_drift else root_mean_square(error)
         squares.append((size / max(scatter, 1e-12)) ** 2)
     return float(np.mean(squares))
+
+
+def _rms_without_drift(t: Floats, values: Floats, degree: int) -> Floats:
+    """Root mean square of columns beyond a polynomial of time."""
+    powers = np.vander(t - t[0], degree + 1)
+    slopes, *_ = np.linalg.lstsq(powers, values)
+    return column_rms(values - powers @ slopes)
 
 
 def beyond_trials(

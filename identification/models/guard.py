@@ -88,8 +88,11 @@ def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
     any other angle would. Stops after the first kind in which it does.
     """
     for kind in (_recorded(model, trials), _turns(model), _reversals(model)):
-        causes = {name: why_unphysical(model, *run) for name, *run in kind}
-        reasons = [f"{name}: {cause}" for name, cause in causes.items() if cause]
+        reasons = []
+        for name, sail, least_surge in kind:
+            cause = why_unphysical(model, sail, least_surge)
+            if cause is not None:
+                reasons.append(f"{name}: {cause}")
         if reasons:
             return reasons
     return []

@@ -371,9 +371,8 @@ class Sailed:
         coefficients = self.prior.coefficients(points)
         ships = in_columns(self.blank.ship_numbers(), len(points))
         ships[self._rows] = self._matrix @ coefficients.T
-        return np.concatenate(
-            [self._errors(part, ships) for part in self._parts(which)]
-        )
+        parts = self._parts(which)
+        return np.concatenate([self._errors(part, ships) for part in parts])
 
     def scales(self, point: Floats) -> Floats:
         """Root mean square error by channel, above the floors; not finite if lost."""

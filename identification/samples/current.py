@@ -408,9 +408,11 @@ def _midpoint_step(
 ) -> tuple[Floats, Floats]:
     """One step of the midpoint rule, kept within what a ship does."""
     surge, sway = accelerations(u, v, now, c)
-    u_half = u + 0.5 * STEP * surge
-    v_half = v + 0.5 * STEP * sway
-    surge, sway = accelerations(u_half, v_half, 0.5 * (now + then), c)
-    u = u + STEP * surge
-    v = v + STEP * sway
-    return np.clip(u, -2.0, 3.0), np.clip(v, -2.0, 2.0)
+    half = 0.5 * STEP
+    u_half = u + half * surge
+    v_half = v + half * sway
+    halfway = 0.5 * (now + then)
+    surge, sway = accelerations(u_half, v_half, halfway, c)
+    u = np.clip(u + STEP * surge, -2.0, 3.0)
+    v = np.clip(v + STEP * sway, -2.0, 2.0)
+    return u, v

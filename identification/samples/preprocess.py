@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -177,18 +178,21 @@ class Reinsch:
         h = np.diff(t)
         left = 1.0 / h[:-1]
         right = 1.0 / h[1:]
+        middle = -left - right
+        diagonals: Any = [left, middle, right]
         self.second_differences = diags_array(  # Q
-            [left, -left - right, right],
+            diagonals,
             offsets=(0, -1, -2),
             shape=(len(t), len(t) - 2),
             format="csr",
         )
         beside = np.pad(h[1:-1] / 6.0, (1, 0))
-        middle = (h[:-1] + h[1:]) / 3.0
+        along = (h[:-1] + h[1:]) / 3.0
         # upper bands, as `scipy.linalg.solveh_banded` wants them
-        self.gram = np.array([np.zeros_like(middle), beside, middle])
+        self.gram = np.array([np.zeros_like(along), beside, along])
         square = self.second_differences.T @ self.second_differences
-        self.square = np.array([np.pad(square.diagonal(k), (k, 0)) for k in (2, 1, 0)])
+        bands = [np.pad(square.diagonal(k), (k, 0)) for k in (2, 1, 0)]
+        self.square = np.array(bands)
 
     def smoothed(self, values: Floats, stiffness: float) -> Floats:
         """Values of the spline at the knots.
