@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from shipgym import InputError
 from shipgym.checks import did_you_mean, quoted
+from shipgym.envs.environment import PACE
 from shipgym.envs.registration import registered
 from shipgym.python_files import working_folder
 
@@ -26,7 +27,8 @@ class Environment(NamedTuple):
     name : str
         A short name, or the absolute path of a task's file.
     options : dict
-        Keywords that its id sets, `model` perhaps among them.
+        Keywords that its id sets, `model` perhaps among them, without the pace of an
+        agent.
     """
 
     name: str
@@ -65,6 +67,8 @@ def read_environment(
     if colon:
         _import(module, text, where)
     options = dict(_registered(name, where))
+    for keyword in PACE:
+        options.pop(keyword, None)
     task = options.pop("task")
     for short_name, shipped_task in SHORT_NAMES.items():
         if task == shipped_task:

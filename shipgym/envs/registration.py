@@ -28,6 +28,7 @@ ENVIRONMENTS: dict[str, dict[str, Any]] = {
     "shipgym/CourseKeepingDiscrete-v0": {
         "task": "CourseKeeping",
         "action": "rudder-discrete",
+        "action_repeat": 10,  # half a ship length: DQN looks few decisions ahead
     },
     "shipgym/CourseKeepingShaft-v0": {
         "task": "CourseKeeping",

@@ -14,7 +14,7 @@ from shipgym.errors import InputError
 from shipgym.models import load_model
 
 COURSE = "shipgym/CourseKeeping-v0"
-DISCRETE = "shipgym/CourseKeepingDiscrete-v0"
+DISCRETE = "shipgym/PathFollowingDiscrete-v0"
 MARINER = load_model("mariner")
 LQ_MARINER = LQ.from_model(MARINER)
 

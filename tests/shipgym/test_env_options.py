@@ -372,3 +372,8 @@ def test_an_interval_is_at_most_five_ship_lengths():
         match=r"^dt: expected a number <= 104.263 .s: 5 ship lengths., got 104.3$",
     ):
         course_keeping_task(dt=104.3).check_fits(mariner)
+
+
+def test_a_decision_of_discrete_course_keeping_lasts_half_a_ship_length():
+    discrete = gymnasium.make("shipgym/CourseKeepingDiscrete-v0").unwrapped
+    assert discrete.dt == pytest.approx(0.5 * discrete.model.travel_time, rel=0.05)
