@@ -374,7 +374,7 @@ def check_kind(kind: Any, where: str) -> None:
     """Refuse a kind of manoeuvre that is not known."""
     use = (
         " (of a zigzag the overshoots are measured, of a turning-circle advance and"
-        " diameter; leave it out of another manoeuvre)"
+        " tactical diameter)"
     )
     check_choice(kind, KINDS, where, use)
 
