@@ -30,19 +30,14 @@ from shipgym.checks import check_choice, check_number
 from shipgym.ships import GreyBox
 
 
-def pattern_search(
-    objective: Callable[[Floats], float],
-    start: Floats,
-    mesh: float = 0.25,
-    finest: float = 1.0 / 64.0,
-    most_evaluations: int = 200,
-) -> Floats:
+def pattern_search(objective: Callable[[Floats], float], start: Floats) -> Floats:
     """Minimise a function of a point of the unit cube without derivatives.
 
     Each round polls the 2n neighbours on the mesh and moves to the best of them if it
-    is better; else the mesh is halved until it is finer than `finest`. No point is
-    evaluated twice, and no round begins after `most_evaluations`.
+    is better; else the mesh, 1/4 at first, is halved until it is finer than 1/64. No
+    point is evaluated twice, and no round begins after 200 evaluations.
     """
+    mesh, finest = 0.25, 1.0 / 64.0
 
     @cache
     def value_at(*point: float) -> float:
@@ -52,7 +47,7 @@ def pattern_search(
     value_at(*best.tolist())
     axes = np.eye(len(best))
     directions = np.vstack([axes, -axes])
-    while mesh >= finest and value_at.cache_info().currsize < most_evaluations:
+    while mesh >= finest and value_at.cache_info().currsize < 200:
         neighbours = np.clip(best + mesh * directions, 0.0, 1.0).tolist()
         nearest = min(neighbours, key=lambda point: value_at(*point))
         if value_at(*nearest) < value_at(*best.tolist()):

@@ -67,7 +67,8 @@ def model_error(
     error = _generalisation(left_out, trials)
     own_factor = _common(fitted)
     if own_factor > error["factor"]:
-        error |= {"factor": own_factor, "how": "errors on the fitted trials"}
+        error["factor"] = own_factor
+        error["how"] = "errors on the fitted trials"
     return {**error, "fitted": fitted}
 
 
