@@ -240,6 +240,7 @@ def by_kernel(
     box = problem.table
     if not isinstance(box, GreyBox):
         reference = identified(trials, beneath).model
+        method = (reference.provenance or {})["method"]
         box = fitted_box(reference)
     found = fit_kernel(kernel, reference, problem, box)
     problem = replace(
