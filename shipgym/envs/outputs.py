@@ -32,11 +32,11 @@ class Outputs:
         self.memory[:] = other.memory
 
 
-class LastInfo(dict[str, Any]):
-    """Info of a step in which an episode ended; `info["episode"]["cost"]` is its cost.
+class EpisodeInfo(dict[str, Any]):
+    """Info with the `episode_cost` so far, which is `info["episode"]["cost"]` too.
 
     The entry is not stored: Gymnasium's RecordEpisodeStatistics refuses an info that
-    holds one. What that, or stable-baselines3's Monitor, stores there gets the cost.
+    holds one. What that, or stable-baselines3's monitors, store there gets the cost.
     """
 
     def __missing__(self, key: str) -> Any:
@@ -48,6 +48,10 @@ class LastInfo(dict[str, Any]):
         if key == "episode":
             value = {**self.__missing__(key), **value}
         super().__setitem__(key, value)
+
+    def copy(self) -> Self:
+        """Copy it, as VecMonitor of stable-baselines3 does."""
+        return type(self)(self)
 
 
 def gather_constraints(

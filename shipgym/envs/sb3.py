@@ -13,6 +13,8 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from shipgym.arrays import Flags
+from shipgym.checks import check_keys, check_whole, unexpected
+from shipgym.envs.outputs import EpisodeInfo
 from shipgym.envs.ship_vector_env import Infos, ShipVectorEnv
 from shipgym.errors import InputError
 from shipgym.extras import library
@@ -39,11 +41,13 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
     Monitor writes it (return `r`, length `l`, time `t`), and its `cost`. Copy the list
     to keep infos beyond the next step.
 
-    Raises InputError for an unknown keyword or a value out of its range.
+    Raises InputError for another environment than one of shipgym's, an unknown keyword
+    or a value out of its range.
 
     Parameters
     ----------
     env_id : str
+        Such as "shipgym/CourseKeeping-v0".
     num_envs : int
         Number of ships.
     seed : int, optional
@@ -54,15 +58,21 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
 
     def __init__(
         self,
-        env_id: str,
+        env_id: str = "",
         num_envs: int = 1,
-        *,
         seed: int | None = None,
         **options: Any,
     ) -> None:
-        mode = AutoresetMode.SAME_STEP  # of stable-baselines3
-        made: Any = gymnasium.make_vec(env_id, num_envs, autoreset_mode=mode, **options)
-        self.vector_env: ShipVectorEnv = made
+        if not env_id:
+            keys = ("env_id", "num_envs", "seed")
+            check_keys(options, keys, "ShipVecEnv", required=keys[:1])
+        if seed is not None:
+            check_whole(seed, "seed", at_least=0)
+        if "autoreset_mode" in options:
+            expected = "none: the next episode begins in the same step"
+            raise unexpected("autoreset_mode", expected, options["autoreset_mode"])
+        made = _made(env_id, num_envs, options)
+        self.vector_env = made
         n = made.num_envs
         super().__init__(
             n,
@@ -149,14 +159,13 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
 
     def _last_info(self, row: int, infos: Infos, truncated: bool) -> dict[str, Any]:
         """Info of a row whose episode ended."""
-        info = _info_of(infos["final_info"], row)
+        info = EpisodeInfo(_info_of(infos["final_info"], row))
         info["terminal_observation"] = infos["final_obs"][row]
         info["TimeLimit.truncated"] = truncated
         info["episode"] = {
             "r": round(float(self._returns[row]), 6),
             "l": int(self._lengths[row]),
             "t": round(time.time() - self._started, 6),
-            "cost": info["episode_cost"],
         }
         return info
 
@@ -201,6 +210,18 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         They record the episode statistics of Monitor, and act as no other.
         """
         return [wrapper_class is Monitor for _ in self._get_indices(indices)]
+
+
+def _made(env_id: Any, num_envs: int, options: dict[str, Any]) -> ShipVectorEnv:
+    """Make ships by their id; InputError for another one."""
+    mode = AutoresetMode.SAME_STEP  # of stable-baselines3
+    try:
+        made: Any = gymnasium.make_vec(env_id, num_envs, autoreset_mode=mode, **options)
+    except (TypeError, gymnasium.error.Error) as error:
+        expected = "the id of an environment of shipgym"
+        raise unexpected("env_id", expected, env_id, str(error)) from None
+    ships: ShipVectorEnv = made
+    return ships
 
 
 def _info_of(infos: Infos, row: int) -> dict[str, Any]:

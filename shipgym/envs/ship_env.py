@@ -18,7 +18,7 @@ from shipgym.envs.environment import (
     ShipsEnv,
     given_orders,
 )
-from shipgym.envs.outputs import ANSWER_OUTCOMES, LastInfo, gather_constraints
+from shipgym.envs.outputs import ANSWER_OUTCOMES, EpisodeInfo, gather_constraints
 from shipgym.envs.starts import start_lanes
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
@@ -106,6 +106,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         self._outcomes = engine.outputs.outcomes[:, 0]
         self._command = engine.command[:, 0]
         self._shape = self._command.shape
+        self._episode_cost = engine._row("episode_cost")[0]
         self._advance = engine.step_of_one()
         if self._paced is not None:
             self._advance = self._paced.advance
@@ -179,9 +180,9 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         terminated, truncated : bool
         info : dict
             The cost and its parts, `heading_error` in rad, `envelope_distance`,
-            `extrapolating`, `constraints`, and what the environment's page names. At
-            the end of an episode also `episode_cost`, which is
-            `info["episode"]["cost"]` too, and `is_success`.
+            `extrapolating`, `constraints`, and what the environment's page names;
+            `episode_cost` so far, which is `info["episode"]["cost"]` too, and
+            `is_success`, whether the episode is one if it ends here.
         """
         if self._over or not self._begun:
             self._refuse_step()
@@ -199,11 +200,12 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         if self._artists:
             self._draw_and_show()
         self._over = terminated + truncated > 0.0
-        lost = terminated > 0.0
-        if self._over:
-            info = self._last(info, lost)
+        ended = terminated > 0.0
+        # in each step, because a wrapper such as TimeLimit may end the episode
+        info["episode_cost"] = float(self._episode_cost[0])
+        info["is_success"] = info.get("success", not ended)
         seen = self._seen()
-        return seen, reward, lost, truncated > 0.0, info
+        return seen, reward, ended, truncated > 0.0, EpisodeInfo(info)
 
     def _seen(self, begun: Flags | None = None) -> Observation:
         """Return a copy of what the agent sees."""
@@ -211,12 +213,6 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         if self._frames is not None:
             seen = self._shown(begun)[0]
         return seen.copy()
-
-    def _last(self, info: dict[str, Any], terminated: bool) -> LastInfo:
-        """Info of a step in which the episode ended."""
-        cost = float(self._engine.read("episode_cost")[0])
-        success = info.get("success", not terminated)
-        return LastInfo({**info, "episode_cost": cost, "is_success": success})
 
     def _draw_and_show(self) -> None:
         self._draw()

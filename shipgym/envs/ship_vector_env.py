@@ -19,7 +19,7 @@ from shipgym.envs.environment import (
     ShipsEnv,
     given_orders,
 )
-from shipgym.envs.outputs import LastInfo, gather_constraints, named_rows
+from shipgym.envs.outputs import EpisodeInfo, gather_constraints, named_rows
 from shipgym.envs.starts import start_lanes
 from shipgym.envs.task_checker import check_once
 from shipgym.errors import InputError
@@ -177,7 +177,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             return infos | self._masks
         return infos | {f"_{name}": mask for name in infos}
 
-    def _note_ends(self, infos: Infos, ended: Flags) -> LastInfo:
+    def _note_ends(self, infos: Infos, ended: Flags) -> EpisodeInfo:
         """Add the cost of episodes that ended, and whether they were a success."""
         outputs = self._engine.outputs
         costs = self._engine.read("episode_cost")
@@ -186,7 +186,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             "episode_cost": np.where(ended, costs, 0.0),
             "is_success": success & ended,
         }
-        return LastInfo({**infos, **more, **{f"_{name}": ended for name in more}})
+        return EpisodeInfo({**infos, **more, **{f"_{name}": ended for name in more}})
 
     def _mask(self, options: dict[str, Any] | None) -> Flags:
         """Rows in which an episode is to begin; InputError for another mask."""
@@ -263,7 +263,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             ended = outputs.terminated | outputs.truncated
             if self.autoreset_mode is AutoresetMode.SAME_STEP:
                 self._some_over = False
-                infos = LastInfo({**infos, **self._final(observations, ended)})
+                infos = EpisodeInfo({**infos, **self._final(observations, ended)})
                 engine.begin_next(ended)
                 observations = self._shown(ended)
             else:

@@ -62,10 +62,12 @@ def start_lanes(engine: Engine, asked: Any, chosen: Flags) -> None:
     columns = {}
     for name, values in asked.items():
         numbers = check_finite(values, f"{where}: {name}")
+        if numbers.shape not in ((), (engine.num_envs,)):
+            expected = f"a number, or one for each of {engine.num_envs} rows"
+            raise unexpected(f"{where}: {name}", expected, values)
         limit = limits.get(name, np.inf)
-        fits = numbers.shape in ((), (engine.num_envs,))
-        if not fits or np.abs(numbers).max() > limit:
-            expected = f"a number or {engine.num_envs}, up to {limit:g} to each side"
+        if np.abs(numbers).max() > limit:
+            expected = f"at most {limit:g} rad to each side"
             raise unexpected(f"{where}: {name}", expected, values)
         columns[name] = np.broadcast_to(numbers, (engine.num_envs,))
 

@@ -1,5 +1,6 @@
 """Battery of checks for a task, reward or sensor set of a user's own."""
 
+import warnings
 from collections.abc import Iterator
 from functools import partial
 from time import monotonic
@@ -63,7 +64,7 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
 def check_once(
     program: EpisodeProgram, model: ShipModel, task: Task, randomisation: Randomisation
 ) -> None:
-    """Check a task of a user's own if it is new; InputError tells its problems.
+    """Check a task of a user's own if it is new: InputError, or warnings of remarks.
 
     A file in the cache folder stands for one that was sound.
     """
@@ -78,6 +79,8 @@ def check_once(
     found = _checked(model, task, randomisation)
     if found.problems:
         raise InputError(found.problems[0])
+    for remark in found.remarks:
+        warnings.warn(remark, stacklevel=4)
     if mark:
         mark.touch()
 

@@ -54,7 +54,9 @@ def sail(env, rudder):
 
 def test_what_fails_late_is_told_with_line_lane_and_step(tmp_path):
     path, line = late(tmp_path)
-    ships = gymnasium.make_vec(COURSE, num_envs=70, task=path, **SHIP)
+    with pytest.warns(UserWarning, match="costs, written with a minus"):
+        ships = gymnasium.make_vec(COURSE, num_envs=70, task=path, **SHIP)
+    gymnasium.make_vec(COURSE, num_envs=3, task=path, **SHIP)  # told once
     with pytest.raises(
         InputError,
         match=rf"fairway.py, line {line + 3}, in step: IndexError: index 1000000000000"

@@ -142,6 +142,10 @@ def test_what_is_wrong_is_said():
     for make, message in (
         (lambda: ours("shipgym/CourseKeeping-v0", sae="calm"), "Did you mean 'sea'"),
         (lambda: ours(COURSE, 0), "num_envs: expected .*got 0"),
+        (lambda: ShipVecEnv(env=COURSE), "Did you mean 'env_id'"),
+        (lambda: ours("CartPole-v1"), "an environment of shipgym, got 'CartPole-v1'"),
+        (lambda: ours(COURSE, seed="3"), "seed: expected an integer"),
+        (lambda: ours(COURSE, autoreset_mode="NextStep"), "autoreset_mode: expected"),
     ):
         with pytest.raises(InputError, match=message):
             make()
