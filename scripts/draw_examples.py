@@ -25,11 +25,17 @@ class Shown(NamedTuple):
     steps: int
 
 
+FAIRWAY = {
+    "task": str(ROOT / "examples" / "fairway.py"),
+    "model": "kvlcc2",
+    "action": "rudder-shaft",
+    "dt": 5.0,
+}
 ROWS = {
     "examples": (
         Shown("shipgym.examples:examples/Berth-v0", {}, 0.35, 40),
         Shown("shipgym.examples:examples/River-v0", {}, 0.7, 25),
-        Shown("shipgym.examples:examples/Fairway-v0", {"dt": 5.0}, 0.7, 80),
+        Shown("shipgym:shipgym/CourseKeeping-v0", FAIRWAY, 0.7, 80),
     ),
     "encounter": (
         Shown("shipgym:shipgym/Encounter-v0", {"case": 17}, 1.0, 40),

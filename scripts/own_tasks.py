@@ -29,9 +29,10 @@ from agents.training.yardsticks import ZeroAction
 from shipgym.envs.registration import register_file
 from shipgym.examples import FOLDER
 
+ROOT = Path(__file__).parents[1]
 TASKS = {
     path.stem: path
-    for folder in (FOLDER, Path(__file__).with_suffix(""))
+    for folder in (FOLDER, ROOT / "examples", Path(__file__).with_suffix(""))
     for path in sorted(folder.glob("[!_]*.py"))
 }
 JUDGED = 1_000_000 + np.arange(100)  # seeds

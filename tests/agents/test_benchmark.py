@@ -25,7 +25,7 @@ N, FIRST = 4, 1_000_000
 MARINER = load_model("mariner")
 SMALL = parse_suite(TEXT, "small")
 CALM = SMALL.task("calm")
-FAIRWAY = Path(__file__).parents[2] / "shipgym" / "examples" / "fairway.py"
+FAIRWAY = Path(__file__).parents[2] / "examples" / "fairway.py"
 
 
 def shipgym(*arguments):

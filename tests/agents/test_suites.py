@@ -23,7 +23,7 @@ from shipgym import InputError, load_model
 from tests.agents.small_suite import TEXT as SMALL
 from tests.agents.small_suite import write_suite
 
-FAIRWAY = Path(__file__).parents[2] / "shipgym" / "examples" / "fairway.py"
+FAIRWAY = Path(__file__).parents[2] / "examples" / "fairway.py"
 SHIPPED = load_suite()
 TEXT = """
 name = "mine-v1"
