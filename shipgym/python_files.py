@@ -2,7 +2,7 @@
 
 import hashlib
 import sys
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from inspect import CO_GENERATOR, CO_VARARGS, CO_VARKEYWORDS
 from os.path import isfile
@@ -82,24 +82,14 @@ def _not_executed(path: Path, resolved: str, error: BaseException) -> InputError
     return InputError(f"{place}: cannot be executed: {told(error)}")
 
 
-def check_function(
-    value: Any,
-    count: int,
-    where: str,
-    what: str,
-    extras: Collection[str] = (),
-) -> None:
-    """Refuse anything but a plain function of `count` arguments; `what` is expected.
-
-    Behind them it may take some of `extras`, by these names.
-    """
+def check_function(value: Any, count: int, where: str, what: str) -> None:
+    """Refuse anything but a plain function of `count` arguments; `what` is expected."""
     if not isinstance(value, FunctionType):
         raise InputError(f"{where}: expected {what}, got no plain function")
     code = value.__code__
     names = code.co_varnames[: code.co_argcount]
-    unknown = set(names[count:]) - set(extras)
     special = code.co_flags & (CO_VARARGS | CO_VARKEYWORDS | CO_GENERATOR)
-    if special or len(names) < count or unknown:
+    if special or len(names) != count:
         found = ", ".join(names) or "none"
         raise InputError(f"{where}: expected {what}, got one of arguments {found}")
 

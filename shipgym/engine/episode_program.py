@@ -10,7 +10,6 @@ from shipgym.engine.annotations import ObservationSpec
 from shipgym.engine.compiled_ship import CompiledSea, CompiledShip
 from shipgym.engine.compiling import compiled, plain_python
 from shipgym.engine.envelope import Envelope
-from shipgym.engine.extra_arguments import completed
 from shipgym.engine.lane_records import (
     CONSTRAINT,
     Commands,
@@ -177,9 +176,9 @@ class EpisodeProgram:
         task = self.task
         return {
             "task_begin": task.begin,
-            "task_step": completed(task.step),
-            "observe": completed(task.observe),
-            "due": completed(task.due),
+            "task_step": task.step,
+            "observe": task.observe,
+            "due": task.due,
             "on_event": task.on_event,
             "worst_cost": task.worst_cost,
             "no_reward": zeros(task.Reward),

@@ -21,7 +21,6 @@ from shipgym.engine.numba_import import load_numba
 from shipgym.engine.records import is_record
 from shipgym.engine.specialise import (
     Hooks,
-    captured_globals,
     is_inlined,
     is_plain,
     named_globals,
@@ -75,9 +74,6 @@ class _Trace:
             self.add((value.__name__, value._fields))
             self._visit_all(value._field_defaults.items())
             self.records.append(value)
-        elif hasattr(value, "py_func"):  # of `numba.njit`
-            self.add((type(value).__name__, value.targetoptions))
-            self._visit_python(value.py_func)
         elif _is_known(value):
             self.add(value)
         else:  # nothing is known of its content: no other process finds it
@@ -104,11 +100,6 @@ class _Trace:
         if not is_plain(function):  # one of Numba's or NumPy's
             self.add(function.__qualname__)
             return
-        named_globals(function, self.hooks)  # refuses variables of a function around it
-        self._visit_python(function)
-
-    def _visit_python(self, function: Any) -> None:
-        """Add bytecode, defaults and globals of a function."""
         if not self._is_new(function):
             return
         own = function.__code__
@@ -120,7 +111,7 @@ class _Trace:
         attributes: list[str] = []
         for code in nested_code(own):
             attributes += code.co_names
-        for name, value in captured_globals(function, self.hooks):
+        for name, value in named_globals(function, self.hooks):
             hook = function.__globals__.get(name)
             self.add(name)
             self.add(is_inlined(hook))  # a hook may say so

@@ -123,12 +123,10 @@ def conclude_lanes(tile: Tile, groups: int) -> tuple[int, int]:
             memory = pick(over, memory, sample(tile, lane, motion, interval, settings))
         store_memory(state, lane, memory)
         seen = readings(motion, load_sea(state, lane), memory)
-        observation = observe(
-            seen, task_state, interval, ship, settings.task, tile, lane
-        )
+        observation = observe(seen, task_state, interval, ship, settings.task)
         store_observation(tile.result, lane, observation, scale)
 
-        is_due = due(motion, task_state, interval, ship, settings.task, tile, lane)
+        is_due = due(motion, task_state, interval, ship, settings.task)
         goes_on = not (over | just_ended)
         real = lane < tile.lanes
         n_due += 1 if is_due & goes_on & real else 0
@@ -184,7 +182,7 @@ def judge(
     task_state, reward, failed, arrived = before, no_reward(), False, False
     if not (MAY_FAIL and over):
         after, earned, failed, arrived = task_step(
-            motion, before, interval, ship, settings.task, tile, lane
+            motion, before, interval, ship, settings.task
         )
         task_state = pick(over, before, after)
         reward = pick(over, reward, earned)
@@ -277,7 +275,7 @@ def take_events(tile: Tile) -> None:
         before = load_task_state(state, lane)
         interval = last_interval(tile, lane)
         going = load_counters(state, lane).ended == 0.0
-        if going and due(motion, before, interval, ship, settings, tile, lane):
+        if going and due(motion, before, interval, ship, settings):
             random = load_random(tile.random, lane)
             plan = plan_of(state, lane)
             after = on_event(motion, before, interval, ship, settings, random, plan)
@@ -306,5 +304,5 @@ def observe_lane(tile: Tile, lane: int) -> None:
     settings = load_task_settings(tile.task_settings, 0)
     interval = last_interval(tile, lane)
     seen = readings(motion, sea, memory)
-    observation = observe(seen, task_state, interval, ship, settings, tile, lane)
+    observation = observe(seen, task_state, interval, ship, settings)
     store_observation(tile.result, lane, observation, scale)

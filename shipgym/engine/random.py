@@ -15,8 +15,7 @@ MIX_2 = np.uint64(0x94D049BB133111EB)
 TO_UNIT = 1.0 / 9007199254740992.0  # 2**-53
 # weather has random numbers apart from those of an episode's task
 WEATHER = np.uint64(0xA0761D6478BD642F)
-# and so have the control intervals of a task, and its normally distributed numbers
-INTERVALS = np.uint64(0x8EBC6AF09C88C6E3)
+# and so have its normally distributed numbers
 NORMAL = np.uint64(0x589965CC75374CC3)
 
 # from a state of the generator to each number drawn at it
@@ -67,11 +66,6 @@ def uniform(
     word = mix(episode_word(key, episode) + draw * GOLDEN)
     part = float(word >> S11) * TO_UNIT
     return low + (high - low) * part
-
-
-def interval_key(key: np.uint64, steps: float) -> np.uint64:
-    """Key of the random numbers of one control interval, by its number."""
-    return mix((key ^ INTERVALS) + np.uint64(steps) * GOLDEN)
 
 
 def rng_state(key: np.uint64, episode: np.uint64) -> np.uint64:

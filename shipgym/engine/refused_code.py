@@ -1,20 +1,12 @@
 """Code of tasks that is refused: random numbers that are not the episode's."""
 
-import random
-from collections.abc import Iterator
 from dis import Instruction, get_instructions
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
-import numpy as np
-
 from shipgym.engine.specialise import users_functions
 from shipgym.errors import InputError
 from shipgym.python_files import nested_code
-
-#: Modules of random numbers that depend on more than key and number of an episode.
-_MODULES = {"numpy.random": np.random, "random": random}
-_GENERATORS = (np.random.RandomState, np.random.Generator, random.Random)
 
 
 def refuse_foreign_random(function: FunctionType) -> None:
@@ -27,62 +19,48 @@ def refuse_foreign_random(function: FunctionType) -> None:
     """
     for one in users_functions(function, {}):
         for code in nested_code(one.__code__):
-            for line, value in _named_values(code, one.__globals__):
-                if module := _module_of(value):
-                    raise InputError(
-                        f"{code.co_filename}, line {line}, in {code.co_name}: expected"
-                        f" random numbers of the episode, got those of {module}; in a"
-                        " function with the argument `random` draw them with"
-                        " drawn(random, number, low, high)"
-                    )
+            _refuse_in(code, one.__globals__)
 
 
-def _named_values(code: CodeType, names: dict[str, Any]) -> Iterator[tuple[int, Any]]:
-    """Line and value of each global that code names, and of attributes of modules."""
+def _refuse_in(code: CodeType, names: dict[str, Any]) -> None:
+    """Look at each global that code names, and at attributes of it."""
     value: Any = None
-    called = ""  # name of the last global
     for instruction in get_instructions(code):
+        name = instruction.argval
         if instruction.opname == "LOAD_GLOBAL":
-            called = instruction.argval
-            value = names.get(called)
-        elif instruction.opname in ("LOAD_ATTR", "LOAD_METHOD"):
-            if isinstance(value, FunctionType):
-                name = instruction.argval
-                raise InputError(
-                    f"{code.co_filename}, line {line_of(instruction, code)}, in"
-                    f" {code.co_name}: expected attributes of functions to be read at"
-                    f" the top of the file, got {called}.{name}; write"
-                    f" {name.upper()} = {called}.{name} there"
-                )
-            is_module = isinstance(value, ModuleType)
-            value = (
-                getattr(
-                    value,
-                    instruction.argval,
-                    None,
-                )
-                if is_module
-                else None
+            value, called = names.get(name), name
+        elif instruction.opname not in ("LOAD_ATTR", "LOAD_METHOD"):
+            value = None
+        elif isinstance(value, FunctionType):
+            raise InputError(
+                f"{_place(instruction, code)}: expected attributes of functions to be"
+                f" read at the top of the file, got {called}.{name}; write"
+                f" {name.upper()} = {called}.{name} there"
             )
         else:
-            value = None
-        yield line_of(instruction, code), value
+            is_module = isinstance(value, ModuleType)
+            value = getattr(value, name, None) if is_module else None
+        if module := _random_module(value):
+            raise InputError(
+                f"{_place(instruction, code)}: expected random numbers of the episode,"
+                f" got those of {module}; in a function with the argument `random` draw"
+                " them with drawn(random, number, low, high)"
+            )
 
 
-def line_of(instruction: Instruction, code: CodeType) -> int:
-    """Return the line of an instruction, or the first of its code."""
+def _place(instruction: Instruction, code: CodeType) -> str:
+    """File, line and function of an instruction."""
     positions = instruction.positions
-    line = positions.lineno if positions else None
-    return line or code.co_firstlineno
+    line = positions.lineno if positions else code.co_firstlineno
+    return f"{code.co_filename}, line {line}, in {code.co_name}"
 
 
-def _module_of(value: Any) -> str:
+def _random_module(value: Any) -> str:
     """Name of the module whose random numbers a value draws; empty if it draws none."""
     owner = getattr(value, "__self__", value)
-    for name, module in _MODULES.items():
-        is_member = getattr(value, "__module__", None) == name
-        if value is module or (is_member and callable(value)):
-            return name
-    if isinstance(owner, _GENERATORS):
-        return "random" if isinstance(owner, random.Random) else "numpy.random"
+    known = [getattr(owner, name, None) for name in ("__name__", "__module__")]
+    for module in ("numpy.random", "random"):
+        for place in (*known, type(owner).__module__):
+            if f"{place}.".startswith(f"{module}."):
+                return module
     return ""

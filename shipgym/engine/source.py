@@ -10,7 +10,6 @@ import numpy as np
 
 from shipgym.checks import check_keys, check_number, check_whole, unexpected
 from shipgym.engine.annotations import Setting
-from shipgym.engine.extra_arguments import EXTRAS, takes_extras
 from shipgym.engine.records import (
     Record,
     field_types,
@@ -70,15 +69,12 @@ def check_namespace(
     for name, arguments in functions.items():
         if name in optional and not hasattr(namespace, name):
             continue
-        extras = EXTRAS if takes_extras(arguments) else ()
         listed = ", ".join(arguments)
         what = f"a function {name}({listed})"
-        if extras:
-            what += ", with or without random and plan behind them"
         function = _named(namespace, name, where, what)
         refuse_closure(function)
         place = f"{where}: {name}"
-        check_function(function, len(arguments), place, what, extras)
+        check_function(function, len(arguments), place, what)
         refuse_foreign_random(function)
         found[name] = function
     return found

@@ -86,23 +86,14 @@ def is_plain(value: Any) -> bool:
 def named_globals(function: Any, hooks: Hooks) -> Iterator[tuple[str, Any]]:
     """Globals that a function names, those of `hooks` in place of its own."""
     refuse_closure(function)
-    return captured_globals(function, hooks)
-
-
-def captured_globals(function: Any, hooks: Hooks) -> Iterator[tuple[str, Any]]:
-    """Globals that a function names, and variables of a function around it."""
     own = function.__globals__
     takes_hooks = is_shipped(function)  # a user's names are the user's
-    for name in loaded_names(function.__code__):
+    names = loaded_names(function.__code__)
+    for name in names:
         if takes_hooks and name in hooks:
             yield name, hooks[name]
         elif name in own:
             yield name, own[name]
-
-    cells = function.__closure__ or ()
-    variables = function.__code__.co_freevars
-    for name, cell in zip(variables, cells, strict=True):
-        yield name, cell.cell_contents
 
 
 @cache

@@ -4,22 +4,23 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from numbers import Integral, Real
 from traceback import walk_tb
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from shipgym.engine import episodes
 from shipgym.engine.compiling import plain
 from shipgym.engine.episode_program import EpisodeProgram
-from shipgym.engine.extra_arguments import innermost
 from shipgym.engine.motion import Motion
-from shipgym.engine.records import LANES, Record, is_array, is_record, members
+from shipgym.engine.records import LANES
 from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError
 from shipgym.python_files import asked, place_of, time_limit
 from shipgym.tasks.contract import Readings
 
 LONGEST_CALL = 5.0  # s, of a user's function
+#: Types of a number and of a boolean that a function returns.
+KINDS: dict[Any, Any] = {bool: np.bool_ | Integral, float: np.bool_ | Real}
 
 
 def plain_loop(
@@ -98,8 +99,7 @@ def _result_of(function: Any, reward: Any, form: Any, *arguments: Any) -> Any:
     if fault and reward is not None:
         fault = fault.replace("result 2", "returned value")  # the reward
     if fault:
-        called = innermost(reward or function)
-        raise InputError(f"{place_of(called)}: {fault}")
+        raise InputError(f"{place_of(reward or function)}: {fault}")
     return given
 
 
@@ -108,34 +108,19 @@ def _fault(given: Any, form: Any, name: str) -> str:
 
     A form is a record, float, bool, or a tuple of forms.
     """
-    parts = _parts(form, name)
-    if parts:
-        kind = form if is_record(form) else tuple
-        fits = isinstance(given, kind) and len(given) == len(parts)
+    if not isinstance(form, tuple):
+        kind = KINDS.get(form, form)
+        fits = isinstance(given, kind)
     else:
-        fits = isinstance(given, np.bool_ | (Integral if form is bool else Real))
+        fits = type(given) is tuple and len(given) == len(form)
     if not fits:
-        words = get_args(form) if is_array(form) else form
-        return f"{name}: expected {_words(words)}, got {_words(given)}"
-    for k, (place, inner) in enumerate(parts):
-        if fault := _fault(given[k], inner, place):
-            return fault
-    return ""
-
-
-def _parts(form: Any, name: str) -> list[tuple[str, Any]]:
-    """Places within a form, and their forms; none for a number or a boolean."""
-    if is_record(form):
-        record: Record = form
-        return [
-            (f"{record.__name__}.{field}", kind if members(kind) else float)
-            for field, kind in members(record)
-        ]
-    if is_array(form):
-        return [(f"{name}[{k}]", one) for k, one in enumerate(get_args(form))]
+        return f"{name}: expected {_words(form)}, got {_words(given)}"
     if isinstance(form, tuple):
-        return [(f"result {k}", one) for k, one in enumerate(form, start=1)]
-    return []
+        for k, part in enumerate(form):
+            place = f"result {k + 1}"
+            if fault := _fault(given[k], part, place):
+                return fault
+    return ""
 
 
 def _words(given: Any) -> str:

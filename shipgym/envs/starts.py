@@ -62,7 +62,8 @@ def start_lanes(engine: Engine, asked: Any, chosen: Flags) -> None:
     columns = {}
     for name, values in asked.items():
         numbers = check_finite(values, f"{where}: {name}")
-        if numbers.shape not in ((), (engine.num_envs,)):
+        shapes = (), (engine.num_envs,)
+        if numbers.shape not in shapes:
             expected = f"a number, or one for each of {engine.num_envs} rows"
             raise unexpected(f"{where}: {name}", expected, values)
         limit = limits.get(name, np.inf)
@@ -112,7 +113,7 @@ def judge_start(
     state = load_task_state(tile.state, lane)
     interval = last_interval(tile, lane)
     judged = interval._replace(dt=NO_TIME, rudder_before=motion.delta)
-    more = (judged, ship, settings.task, tile, lane)
+    more = (judged, ship, settings.task)
     after, _, failed, arrived = task_step(motion, state, *more)
     if not np.isnan(heading_error):
         motion = motion._replace(psi=after.heading_setpoint - heading_error)

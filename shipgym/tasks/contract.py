@@ -44,9 +44,6 @@ and may define
 
 Other ships are records in `State` that `step` sails (`shipgym.tasks.traffic`).
 
-`step`, `observe`, `due` and `reward` may take `random`, `plan` or both, by these names,
-behind `settings`. There `plan` is only read, and `random` holds the numbers of the
-interval, not of the episode: `drawn(random, 0, low, high)` is another in each.
 `numpy.random` and `random` are refused.
 
 The engine makes the reward of the cost c of a step, for any task: p - c / (c + b). At

@@ -22,7 +22,6 @@ from shipgym.checks import (
     quoted,
     unexpected,
 )
-from shipgym.engine.extra_arguments import completed
 from shipgym.engine.hooks import reward_of_another, step_of_task
 from shipgym.engine.records import (
     Record,
@@ -370,14 +369,10 @@ def rewarded_step(
     interval: Any,
     ship: Any,
     settings: Any,
-    tile: Any,
-    lane: Any,
 ) -> Any:
     """Step of a task with the reward of another file."""
-    after, _, failed, arrived = step_of_task(
-        motion, state, interval, ship, settings, tile, lane
-    )
-    reward = reward_of_another(motion, after, interval, ship, settings, tile, lane)
+    after, _, failed, arrived = step_of_task(motion, state, interval, ship, settings)
+    reward = reward_of_another(motion, after, interval, ship, settings)
     return after, reward, failed, arrived
 
 
@@ -405,8 +400,8 @@ def _filled(step: Any, reward: Any) -> FunctionType:
     """Fill the hooks of `rewarded_step`."""
     hooks = {
         "__name__": __name__,
-        "step_of_task": completed(step),
-        "reward_of_another": completed(reward),
+        "step_of_task": step,
+        "reward_of_another": reward,
     }
     function = FunctionType(rewarded_step.__code__, hooks, "rewarded_step")
     return _FILLED.setdefault((step, reward), function)

@@ -50,11 +50,6 @@ class Path:
         """Change of course after each leg, rad, to starboard; 0 at the last."""
         return np.append(wrapped(np.diff(self.courses)), 0.0)
 
-    @property
-    def length(self) -> float:
-        """Length of the path, m."""
-        return float(self.lengths.sum())
-
     def check_turns(self, radius: float) -> None:
         """Refuse a path that doubles back, or whose turns do not fit into its legs.
 

@@ -120,8 +120,9 @@ def approach(motion: Motion, target: Target) -> Approach:
     to_own = arctan2(-away_y, -away_x)
     bearing = to_other - motion.psi
     aspect = to_own - target.course
+    distance = sqrt(squared_distance)
     return Approach(
-        distance=sqrt(squared_distance),
+        distance=distance,
         bearing=wrap(bearing),
         aspect=wrap(aspect),
         dcpa=sqrt(squared_dcpa),

@@ -9,7 +9,7 @@ import pytest
 
 from shipgym import InputError, check_task
 
-EXAMPLES = Path(__file__).parents[2] / "shipgym" / "examples"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 FAIRWAY = (EXAMPLES / "fairway.py").read_text(encoding="utf-8")
 CASES = Path(__file__).parents[3] / "shared" / "cases" / "tasks"
 COURSE = "shipgym:shipgym/CourseKeeping-v0"
@@ -52,6 +52,7 @@ def sail(env, rudder):
         env.step(orders)
 
 
+@pytest.mark.filterwarnings("ignore:.*expected no print")
 def test_what_fails_late_is_told_with_line_lane_and_step(tmp_path):
     path, line = late(tmp_path)
     with pytest.warns(UserWarning, match="costs, written with a minus"):

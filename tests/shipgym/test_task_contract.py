@@ -1,4 +1,4 @@
-"""Arrays, plan, random numbers and repeated records in a task; settings at a reset."""
+"""Arrays, plan, random numbers and repeated records in a task; its settings."""
 
 import gymnasium
 import numpy as np
@@ -36,7 +36,7 @@ class Settings(NamedTuple):
     speeds: Annotated[tuple[float, float], Setting("Of the targets.", at_most=9.0)] = (
         1.0, 2.0
     )
-    bonus: float = 0.5
+    charge: float = 0.5
     part: float = 0.5
 
 
@@ -45,6 +45,7 @@ class State(NamedTuple):
     headings: Annotated[tuple[float, ...], Size(4)]
     luck: float
     gate: float
+    noise: float
 
 
 class Reward(NamedTuple):
@@ -68,14 +69,14 @@ def begin(ship, settings, random, plan):
     targets = (Target(0.0, plan[0]), Target(9.0, 9.0))
     part = settings.part
     motion = under_way(0.0, 0.0, 0.0, part * ship.speed, part * ship.shaft)
-    return motion, State(targets, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0)
+    return motion, State(targets, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
 
 
 def moved(target, speed, interval):
     return Target(target.x + speed * interval.dt, target.y)
 
 
-def step(motion, state, interval, ship, settings, plan, random):
+def step(motion, state, interval, ship, settings):
     first, second = state.targets
     targets = (
         moved(first, settings.speeds[0], interval),
@@ -87,21 +88,33 @@ def step(motion, state, interval, ship, settings, plan, random):
     for target in targets:
         total += target.x
     headings = state.headings[1:] + (motion.psi,)
-    after = State(targets, headings, drawn(random, 0, 0.0, 1.0), plan[0] + plan[1])
-    return after, Reward(settings.bonus - 0.001 * total), False, False
+    after = State(targets, headings, state.luck, state.gate, state.noise)
+    return after, Reward(-settings.charge - 0.001 * abs(total)), False, False
+
+
+def due(motion, state, interval, ship, settings):
+    return True
+
+
+def on_event(motion, state, interval, ship, settings, random, plan):
+    number = int(interval.steps)
+    luck = drawn(random, number, 0.0, 1.0)
+    gate = plan[0] + plan[1]
+    noise = drawn_normal(random, number)
+    return State(state.targets, state.headings, luck, gate, noise)
 
 
 def seen_of(target, readings):
     return Seen(target.x - readings.x, target.y - readings.y)
 
 
-def observe(readings, state, interval, ship, settings, random):
+def observe(readings, state, interval, ship, settings):
     first, second = state.targets
     return Observation(
         (seen_of(first, readings), seen_of(second, readings)),
         seen_of(first, readings),
         state.headings[2:],
-        drawn_normal(random, 1),
+        state.noise,
     )
 """
 NAMES = (
@@ -151,36 +164,18 @@ def test_arrays_plan_and_random_numbers_are_the_same_for_one_ship_and_many(task)
     assert np.std(of_many[0][..., 8]) == pytest.approx(1.0, abs=0.1)
 
 
-def test_settings_apply_until_the_next_reset(task):
-    options = {"bonus": 1.0, "speeds": [2.0, 3.0], "part": 0.25}
-    many = gymnasium.make_vec(COURSE, num_envs=3, task=task)
-    one = gymnasium.make(COURSE, task=task).unwrapped
-    many.reset(seed=2, options=options)
-    of_many = sailed(many, 12)
-    for row in range(3):
-        one.reset(seed=2 + row, options=options)
-        assert one.physical_state()["u"] < 0.3 * one.model.particulars["speed"]
-        for all_rows, alone in zip(of_many, sailed(one, 12), strict=True):
-            np.testing.assert_array_equal(all_rows[:, row], alone)
-    one.reset(seed=2)
-    many.reset(seed=2)
-    np.testing.assert_array_equal(sailed(many, 3)[1][:, 0], sailed(one, 3)[1])
-    assert one.step(one.action_space.sample())[4]["cost"] > -0.5  # of the bonus
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"bonsu": 1.0}, "options: unknown key 'bonsu'. Did you mean 'bonus'"),
+        ({"chrage": 1.0}, "unknown key 'chrage'. Did you mean 'charge'"),
         ({"speeds": [1.0, 2.0, 3.0]}, "speeds: expected 2 numbers"),
         ({"speeds": [1.0, 99.0]}, "speeds: number 1: expected a number <= 9"),
-        ({"bonus": [1.0, 2.0]}, r"bonus: expected a number, got \[1.0, 2.0\]"),
+        ({"charge": [1.0, 2.0]}, r"charge: expected a number, got \[1.0, 2.0\]"),
     ],
 )
-def test_options_of_a_reset_are_checked(task, options, message):
-    many = gymnasium.make_vec(COURSE, num_envs=3, task=task)
+def test_settings_are_checked(task, options, message):
     with pytest.raises(InputError, match=message):
-        many.reset(options=options)
+        gymnasium.make(COURSE, task=task, **options)
 
 
 WRONG = {
@@ -195,19 +190,19 @@ WRONG = {
     "    luck: float": [
         ("    luck: tuple[float, float]", "REPORTED: expected .* each a number"),
     ],
-    "    bonus: float = 0.5": [
+    "    charge: float = 0.5": [
         (
-            "    bonus: tuple[float, float] = (1.0,)",
-            "Settings.bonus: default: expected",
+            "    charge: tuple[float, float] = (1.0,)",
+            "Settings.charge: default: expected",
         ),
-        ("    bonus: tuple[float, ...] = (1.0,)", "Settings.bonus: expected a float"),
+        ("    charge: tuple[float, ...] = (1.0,)", "Settings.charge: expected a float"),
         ("    task: float = 0.5", "Settings.task: expected a name of its own"),
     ],
     "    noise: Anno": [
         ("    nearest_east: Anno", "Observation: .* got 2 fields 'nearest_east'"),
     ],
-    "plan, random):\n    first": [
-        ("plan, chance):\n    first", "with or without random and plan .* chance"),
+    "settings):\n    first": [
+        ("settings, random):\n    first", "step: expected .* settings, random"),
     ],
 }
 CASES = [(old, new, message) for old, many in WRONG.items() for new, message in many]
