@@ -53,8 +53,6 @@ class Engine(Lanes):
         Whether a model that was found unstable when it was identified may be used.
     loop : callable, optional
         Makes the loop that steps the ships; by default it is compiled.
-    scale_task : Task, optional
-        Task that gives the scales of observations; by default `task`.
     cut_off : float
         Control intervals after which an episode is truncated, if earlier than by the
         task.
@@ -75,7 +73,6 @@ class Engine(Lanes):
         randomisation: Randomisation | None = None,
         allow_unstable: bool = False,
         loop: Callable[[EpisodeProgram], Any] | None = None,
-        scale_task: Task | None = None,
         cut_off: float = np.inf,
     ) -> None:
         check_whole(num_envs, "num_envs", at_least=1)
@@ -84,17 +81,6 @@ class Engine(Lanes):
         model = ships[0]
         task = task or course_keeping_task()
         task.check_fits(model)
-        scale_task = scale_task or task
-
-        self.rebuild: Callable[..., Engine] = partial(
-            Engine,
-            models,
-            num_envs,
-            randomisation=randomisation,
-            allow_unstable=allow_unstable,
-            scale_task=scale_task,
-            cut_off=cut_off,
-        )
         randomisation = randomisation or Randomisation()
         self.pool = randomisation.ships(model, task.seas)
         drawn = len(self.pool) > 1
@@ -115,7 +101,7 @@ class Engine(Lanes):
             len(own) == 1,
             task.checked,
         )
-        contents = Contents(own, drawn, scale_task, cut_off)
+        contents = Contents(own, drawn, cut_off)
         super().__init__(program, model, task, num_envs, contents)
         self._begin_all(loop or self._compiled)
 

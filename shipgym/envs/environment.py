@@ -18,7 +18,6 @@ from shipgym.arrays import Flags
 from shipgym.checks import (
     check_choice,
     check_flag,
-    check_keys,
     check_whole,
     unexpected,
 )
@@ -145,7 +144,6 @@ class ShipsEnv:
         self,
         arguments: dict[str, Any],
         taken: Sequence[str],
-        render_modes: Sequence[str],
     ) -> tuple[Any, Space]:
         """Read the arguments of the environment; return the spaces of one ship."""
         options = arguments.pop("options")
@@ -155,7 +153,7 @@ class ShipsEnv:
         self._arguments = given | options
         mode = given["render_mode"]
         if mode is not None:
-            check_choice(mode, render_modes, "render_mode", also=", or None")
+            check_choice(mode, ["rgb_array"], "render_mode", also=", or None")
         self.render_mode = mode
         self.model, self.task, self.randomisation = read_options(
             given["task"], given["model"], options, taken
@@ -173,7 +171,7 @@ class ShipsEnv:
         longest = given.get(LONGEST) or -1
         if longest != -1:
             longest = check_whole(longest, LONGEST, at_least=1)
-        self._own_engine = Engine(
+        engine = Engine(
             self.model,
             num_envs,
             self.task,
@@ -181,12 +179,11 @@ class ShipsEnv:
             allow_unstable=given["allow_unstable"],
             cut_off=np.inf if longest == -1 else longest * self.pace.action_repeat,
         )
-        self._asked: dict[str, Any] = {}
-        self._artists = [] if mode is None else _artists(mode, num_envs)
+        self._artists = [] if mode is None else _artists(num_envs)
         self._observe_and_order(num_envs)
         self._begun = False  # and not closed since
         self._keys: NDArray[np.uint64] | None = None  # of each row's episodes
-        self._use(self._own_engine)
+        self._use(engine)
         return spaces(self.task, self.model, self.pace.frame_stack)
 
     def _observe_and_order(self, num_envs: int) -> None:
@@ -268,7 +265,7 @@ class ShipsEnv:
         if self._begun:
             kept = {name: getattr(self, name, None) for name in KEPT}
             engine_state = self._engine.get_state()
-            state = (self._asked, engine_state, kept)
+            state = (engine_state, kept)
         kind = type(self)
         return rebuild, (kind, self._arguments, state, attributes)
 
@@ -276,39 +273,15 @@ class ShipsEnv:
         _, (kind, arguments, state, attributes) = self.__reduce__()
         return rebuild(kind, arguments, state, copy.deepcopy(attributes, memo))
 
-    def _continue(
-        self, asked: dict[str, Any], engine_state: Any, kept: dict[str, Any]
-    ) -> None:
+    def _continue(self, engine_state: Any, kept: dict[str, Any]) -> None:
         """Continue from the state of an environment with the same arguments."""
         self._begun = True
-        self._asked = dict(asked)
-        engine = self._engine_for(asked)
+        engine = self._engine
         engine.set_state(engine_state)
         self._use(engine)
         vars(self).update(copy.deepcopy(kept))
         for artist in self._artists:
             artist.begin(engine)
-
-    def _engine_for(self, asked: Mapping[str, Any]) -> Engine:
-        """Return the engine, or one with other settings or a certain ship."""
-        own = self._own_engine
-        if not asked:
-            return own
-        return own.rebuild(task=self.task.changed(**asked))
-
-    def _take(self, options: Mapping[str, Any] | None, *more: str) -> None:
-        """Apply the options of a reset until the next one.
-
-        Raises InputError for other options, or a value that does not fit.
-        """
-        given = (options or {}).items()
-        asked = {name: value for name, value in given if value is not None}
-        check_keys(asked, [*self.task.definition.settings, *more], "options")
-        for name in more:
-            asked.pop(name, None)
-        if asked or self._asked:
-            self._use(self._engine_for(asked))
-            self._asked = asked
 
     def _refuse_step(self) -> NoReturn:
         """Raise the InputError of an environment in which no episode goes on."""
@@ -343,10 +316,10 @@ class ShipsEnv:
                 artist.note(engine)
 
 
-def _artists(mode: str, num_envs: int) -> list[Artist]:
+def _artists(num_envs: int) -> list[Artist]:
     from shipgym.envs.rendering import Artist  # needed only for pictures
 
-    return [Artist(mode, row) for row in range(num_envs)]
+    return [Artist(row) for row in range(num_envs)]
 
 
 def rebuild(

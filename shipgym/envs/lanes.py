@@ -1,6 +1,6 @@
 """State of many ships by lane: layout, reading, writing and copies between steps."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +18,6 @@ from shipgym.envs.randomisation import Pool
 from shipgym.instruments.noise import SEA_TRIAL
 from shipgym.models import ShipModel
 from shipgym.sea.weather_column import weather_column
-from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.shapes import Shape, shapes_of
 from shipgym.tasks.task import Task
 
@@ -29,7 +28,6 @@ class Contents(NamedTuple):
     # one ship and sea for all lanes or one each, or the pool
     own: Pool
     drawn: bool  # whether each episode draws a ship and a sea of a pool
-    scale_task: Task  # that gives the scales of observations
     cut_off: float  # control intervals after which episodes are truncated
 
 
@@ -92,10 +90,8 @@ class Lanes:
 
     def _filled_tables(self, contents: Contents, n_tiles: int) -> dict[str, Floats]:
         """Tables of ships, of their pool, and of settings of the task."""
-        own, drawn, scale_task, _ = contents
-        columns = ship_columns(
-            own, self.windy, self.task, self.model, drawn, scale_task
-        )
+        own, drawn, _ = contents
+        columns = ship_columns(own, self.windy, self.task, self.model, drawn)
         n_ship_rows = columns.shape[1]
         pool = columns if drawn else np.zeros((0, n_ship_rows))
         return {
@@ -327,12 +323,11 @@ def ship_columns(
     task: Task,
     base: ShipModel,
     drawn: bool,
-    scale_task: Task,
 ) -> Floats:
     """Numbers of ships and of the seas around them, a row each.
 
     The sea is computed once for each kind of ship. Ships that are drawn for an
-    episode are seen in the scales of the environment's model, and of `scale_task`.
+    episode are seen in the scales of the environment's model.
     """
     step = task.substep(base)
     known: dict[tuple[int, int], Floats] = {}
@@ -349,20 +344,16 @@ def ship_columns(
         sea_parameters = known.get(kind, np.zeros(0))
 
         ship = Ship(*numbers[: len(Ship._fields)].tolist())
-        factors = _scale_factors(scale_task, ship, task.definition.observations)
+        factors = _scale_factors(task, ship)
         envelope = envelope_numbers(model)
         columns.append([*numbers, *envelope, *sea_parameters, *factors])
     return np.stack(columns)
 
 
-def _scale_factors(
-    task: Task,
-    ship: Ship,
-    specs: Mapping[str, ObservationSpec],
-) -> list[float]:
+def _scale_factors(task: Task, ship: Ship) -> list[float]:
     """Observations of quantities of 1; 0 for those that such a ship does not have."""
     factors = []
-    for spec in specs.values():
+    for spec in task.definition.observations.values():
         scale = task.scale_of(spec, ship)
         if scale == 0.0:
             factors.append(0.0)

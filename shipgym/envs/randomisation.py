@@ -106,7 +106,7 @@ class Randomisation:
                 drawn = model.sample(n_rounds, random)
             samples.append(drawn)
 
-        paces = self._paces(models)
+        paces: dict[Any, Particulars] = {}
         pool: Pool = []
         for round_number, in_turn in enumerate(zip(*samples, strict=True)):
             sea = seas[round_number % len(seas)]
@@ -115,37 +115,28 @@ class Randomisation:
                 pool.append((self._varied(ship, paces, random), sea))
         return pool
 
-    def _paces(self, models: Sequence[ShipModel]) -> dict[int, list[Particulars]]:
-        """Particulars of each model at each approach speed.
-
-        Each is one object, because the weather is computed once for an object.
-        """
-        least, largest = self.speed_range or (1.0, 1.0)
-        parts = np.linspace(least, largest, N_SPEEDS).tolist()
-        paces = {}
-        for model in models:
-            own = model.particulars
-            speeds = [part * own["speed"] for part in parts]
-            paces[id(own)] = [replace(own, speed=speed) for speed in speeds]
-        return paces
-
     def _varied(
         self,
         ship: ShipModel,
-        paces: dict[int, list[Particulars]],
+        paces: dict[Any, Particulars],
         random: np.random.Generator,
     ) -> ShipModel:
-        """Ship at a speed, of a loading and with a gear within the ranges."""
+        """Ship at a speed, of a loading and with a gear within the ranges.
+
+        `paces`: particulars at each approach speed, one object each, because the
+        weather is computed once for an object.
+        """
         if self.loading_range:
             ship = _loaded(ship, random.uniform(*self.loading_range))
         if self.speed_range:
             own = ship.particulars
-            pace = paces[id(own)][random.integers(N_SPEEDS)]
-            part = pace["speed"] / own["speed"]
+            parts = np.linspace(*self.speed_range, N_SPEEDS).tolist()
+            speed = parts[random.integers(N_SPEEDS)] * own["speed"]
+            pace = paces.setdefault((id(own), speed), replace(own, speed=speed))
             ship = replace(
                 ship,
                 particulars=pace,
-                service_shaft_speed=part * ship.service_shaft_speed,
+                service_shaft_speed=speed / own["speed"] * ship.service_shaft_speed,
             )
         if self.rudder_rate_range:
             rate = random.uniform(*self.rudder_rate_range)

@@ -33,19 +33,15 @@ HULL_OUTLINE = np.vstack([OUTLINE, OUTLINE[:0:-1] * [1.0, -1.0]])
 
 
 class Artist:
-    """Draws one lane of an engine into arrays ("rgb_array"), or a window ("human").
+    """Draws one lane of an engine into arrays.
 
     Raises InputError where pygame-ce is not installed.
     """
 
-    def __init__(self, mode: str, lane: int = 0) -> None:
+    def __init__(self, lane: int = 0) -> None:
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-        self._pygame = library("pygame", "render", f"render_mode {mode!r} needs it")
-        self._pygame.font.init()
-        self._mode = mode
+        self._pygame = library("pygame", "render", "render_mode needs it")
         self._lane = lane
-        self._window: Any = None
-        self._clock: Any = None
         self._wake: list[tuple[float, float]] = []
 
     def begin(self, engine: Engine) -> None:
@@ -78,8 +74,6 @@ class Artist:
         chart.write(_readouts(engine, self._lane, state))
 
         surface = self._pygame.transform.smoothscale(chart.surface, (SIZE, SIZE))
-        if self._mode == "human":
-            self._show(surface)
         columns = self._pygame.surfarray.array3d(surface)
         return np.transpose(columns, (1, 0, 2))
 
@@ -87,25 +81,6 @@ class Artist:
         """Physical state of the lane."""
         states = engine.physical_state()
         return {name: float(values[self._lane]) for name, values in states.items()}
-
-    def _show(self, surface: Any) -> None:
-        pygame = self._pygame
-        if self._window is None:
-            pygame.display.init()
-            self._window = pygame.display.set_mode((SIZE, SIZE))
-            pygame.display.set_caption("shipgym")
-            self._clock = pygame.time.Clock()
-        pygame.event.pump()
-        self._window.blit(surface, (0, 0))
-        pygame.display.flip()
-        frames_per_second = 30
-        self._clock.tick(frames_per_second)
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        if self._window is not None:
-            self._pygame.display.quit()
-            self._window = None
 
 
 class _Chart:
@@ -116,6 +91,7 @@ class _Chart:
         self.surface.fill(WATER)
         self.metres = width / SIDE  # of a pixel
         self._draw = pygame.draw
+        pygame.font.init()  # a window that was closed ends it
         self._font = pygame.font.Font(None, FINER * 20)
         self._centre = np.array([x, y])
 
@@ -140,16 +116,18 @@ class _Chart:
     def write(self, lines: dict[str, str]) -> None:
         """Write labels and values in the upper left corner."""
         spacing = 19 * FINER
+        margin = 8 * FINER
         right = 212 * FINER
-        below = 6 * FINER + spacing * len(lines)
+        below = margin + spacing * len(lines)
         self.surface.fill(PANEL, (0, 0, right, below))
-        for row, (label, text) in enumerate(lines.items()):
-            down = 6 * FINER + spacing * row
+        down = margin
+        for label, text in lines.items():
             name = self._font.render(label, True, rgb("faint"))
             value = self._font.render(text, True, rgb("ink"))
-            self.surface.blit(name, (8 * FINER, down))
-            left = right - 8 * FINER - value.get_width()
+            left = right - margin - value.get_width()
+            self.surface.blit(name, (margin, down))
             self.surface.blit(value, (left, down))
+            down += spacing
 
 
 def _direction(angle: float) -> Floats:

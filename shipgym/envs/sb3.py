@@ -97,8 +97,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         """Begin an episode in each row: the next, or by the seeds of `seed`, once.
 
         Options of `set_options` are those of the native environment's `reset`, the same
-        in all rows. Episodes that begin by themselves
-        keep them, until the next `reset`. Raises InputError as that does.
+        in all rows. Raises InputError as that does.
         """
         options, *others = self._options
         self._reset_options()

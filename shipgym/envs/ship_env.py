@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.arrays import Flags, Floats
-from shipgym.checks import unexpected
+from shipgym.checks import check_keys, unexpected
 from shipgym.engine.episodes import REFUSED
 from shipgym.envs.engine import Engine, as_numbers
 from shipgym.envs.environment import (
@@ -47,8 +47,8 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         A shipped model's name, the path of a model file, or a model.
     task : str, Path or module
         The name of a registered task, or the file of one (`shipgym.tasks.contract`).
-    render_mode : {None, "human", "rgb_array"}
-        Render mode of Gymnasium.
+    render_mode : {None, "rgb_array"}
+        Whether `render` gives pictures; `gymnasium.make` shows them for "human".
     allow_unstable : bool
         Whether a model that was found unstable when it was identified may be used.
     action_repeat : int
@@ -72,7 +72,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
-        "render_modes": ["human", "rgb_array"],
+        "render_modes": ["rgb_array"],
         "render_fps": 30,
     }
 
@@ -89,9 +89,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         **options: Any,
     ) -> None:
         arguments = locals()
-        observation_space, action_space = self._make(
-            arguments, ENV_OPTIONS, self.metadata["render_modes"]
-        )
+        observation_space, action_space = self._make(arguments, ENV_OPTIONS)
         self.observation_space = observation_space
         self.action_space = action_space
         self._names = self.task.info_names
@@ -131,8 +129,6 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         seed : int, optional
             Fixes this episode and all that follow it.
         options : dict, optional
-            Until the next reset: settings of the task by their names, such as
-            `waypoints` of the path. Observations keep the scales of the environment.
             `start`, for this episode alone: a dictionary of `heading_error`, rad,
             `cross_track`, m, `speed`, m/s, `yaw_rate`, rad/s, and `rudder`, rad, of the
             ship at the start.
@@ -145,8 +141,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         """
         super().reset(seed=seed)
         episodes = self._engine.episodes + np.uint64(1)
-        if options or self._asked:
-            self._take(options, "start")
+        check_keys(options or {}, ["start"], "options")
         if seed is not None or self._keys is None:
             self._keys = self._drawn_keys()
             episodes[:] = 0
@@ -155,7 +150,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         self._engine.begin(self._keys, episodes)
         if options and options.get("start"):
             start_lanes(self._engine, options["start"], self._engine.all_lanes)
-        self._draw_and_show()
+        self._draw()
         numbers = self._outcomes[ANSWER_OUTCOMES:].tolist()
         return self._seen(self._engine.all_lanes), self._info(numbers)
 
@@ -198,14 +193,15 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             self._engine.refuse_rewards()
         info = self._info(numbers)
         if self._artists:
-            self._draw_and_show()
+            self._draw()
         self._over = terminated + truncated > 0.0
         ended = terminated > 0.0
         # in each step, because a wrapper such as TimeLimit may end the episode
         info["episode_cost"] = float(self._episode_cost[0])
         info["is_success"] = info.get("success", not ended)
         seen = self._seen()
-        return seen, reward, ended, truncated > 0.0, EpisodeInfo(info)
+        cut_off = truncated > 0.0
+        return seen, reward, ended, cut_off, EpisodeInfo(info)
 
     def _seen(self, begun: Flags | None = None) -> Observation:
         """Return a copy of what the agent sees."""
@@ -213,11 +209,6 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         if self._frames is not None:
             seen = self._shown(begun)[0]
         return seen.copy()
-
-    def _draw_and_show(self) -> None:
-        self._draw()
-        if self.render_mode == "human":
-            self.render()
 
     def _info(self, numbers: list[float]) -> dict[str, Any]:
         info: dict[str, Any] = dict(zip(self._names, numbers, strict=False))
@@ -253,14 +244,12 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
     def render(self) -> Any:
         """Picture of the ship on her chart, uint8 array of shape (600, 600, 3).
 
-        None in a window, and without a render mode, with a warning.
+        None without a render mode, with a warning.
         """
         self._warn_of_no_mode()
         pictures = [artist.picture(self._engine) for artist in self._artists]
-        return pictures[0] if self.render_mode == "rgb_array" else None
+        return pictures[0] if pictures else None
 
     def close(self) -> None:
-        """Close the window, if there is one; a further step needs a `reset`."""
+        """Close the environment; a further step needs a `reset`."""
         self._begun = False
-        for artist in self._artists:
-            artist.close()

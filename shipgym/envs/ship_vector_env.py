@@ -72,9 +72,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
     ) -> None:
         arguments = locals()
         mode = _mode(autoreset_mode)
-        observation_space, action_space = self._make(
-            arguments, VECTOR_OPTIONS, ["rgb_array"]
-        )
+        observation_space, action_space = self._make(arguments, VECTOR_OPTIONS)
         check_once(self._engine.program, self.model, self.task, self.randomisation)
         self.num_envs = int(num_envs)
         self.metadata = {
@@ -114,8 +112,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             next episodes begin.
         options : dict, optional
             `reset_mask`, bool array of shape (num_envs,): rows in which an episode is
-            to begin, the others go on. Or those of the single environment, for all
-            rows; numbers of `start` may be arrays of shape (num_envs,).
+            to begin, the others go on. `start` as in the single environment; its
+            numbers may be arrays of shape (num_envs,).
 
         Returns
         -------
@@ -126,8 +124,6 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         super().reset(seed=seed if isinstance(seed, int) else None)
         mask = self._mask(options)
         episodes = self._engine.episodes + np.uint64(1)
-        if mask.all():
-            self._take(options, "reset_mask", "start")
         engine = self._engine
         self._keys, episodes = self._next_episodes(seed, mask, episodes)
         shown_before = engine.outputs
@@ -191,6 +187,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
     def _mask(self, options: dict[str, Any] | None) -> Flags:
         """Rows in which an episode is to begin; InputError for another mask."""
         options = options or {}
+        check_keys(options, ["reset_mask", "start"], "options")
         mask: Any = options.get("reset_mask", self._engine.all_lanes)
         is_flags = isinstance(mask, np.ndarray) and mask.dtype == np.bool_
         shape = (self.num_envs,)
@@ -201,10 +198,6 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             raise InputError(
                 "options: reset_mask: expected True in one row at least, got none"
             )
-        if not mask.all():
-            # other options apply to the engine, which all rows share
-            where = "options with a reset_mask of some rows"
-            check_keys(options, ["reset_mask", "start"], where)
         return np.asarray(mask)
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:

@@ -28,9 +28,9 @@ def another(x, y, psi, answer=1.0):
     return Other(Place(x, y, psi, 0.0), Habits(U, L, psi, answer, 12.0 * L / U), 0.0)
 
 
-def looked_at(env, **reset):
+def looked_at(env, seed):
     """Distances, closest distances and times of the others at the start, lengths."""
-    seen, _ = env.reset(**reset)
+    seen, _ = env.reset(seed=seed)
     names = env.unwrapped.observation_names
     shown = []
     for name in ("distance", "dcpa", "tcpa"):
@@ -42,9 +42,9 @@ def looked_at(env, **reset):
 def test_the_others_of_a_case_of_imazu_meet_who_keeps_her_course():
     assert IMAZU.shape == (22, 3)
     assert np.isfinite(IMAZU).sum(axis=1).tolist() == [1] * 4 + [2] * 7 + [3] * 11
-    env = gymnasium.make(ID)
     for case in range(1, 23):
-        distance, dcpa, tcpa = looked_at(env, seed=case, options={"case": case})
+        env = gymnasium.make(ID, case=case)
+        distance, dcpa, tcpa = looked_at(env, seed=case)
         present = distance < 60.0
         assert present.sum() == np.isfinite(IMAZU[case - 1]).sum()
         assert dcpa[present].max() < 1.01

@@ -92,22 +92,15 @@ def test_copies_step_identically_and_on_their_own(make, options, again):
 
 
 @pytest.mark.parametrize("make", [one, many])
-def test_waypoints_of_a_reset_hold_until_the_next(make):
-    env = make().unwrapped
-    path = env.waypoints if make is many else lambda: env.waypoints
+def test_waypoints_may_be_given(make):
+    env = make(waypoints=HOOK).unwrapped
     env.reset(seed=1)
-    drawn = path()
-    env.reset(seed=1, options={"waypoints": HOOK})
-    np.testing.assert_array_equal(path(), HOOK)
-    other = copy.deepcopy(env)
-    same(sailed(env), sailed(other))
-    env.reset(seed=1)
-    np.testing.assert_array_equal(path(), drawn)
+    path = env.waypoints() if make is many else env.waypoints
+    np.testing.assert_array_equal(path, HOOK)
     with pytest.raises(
         InputError, match="waypoints: rows 0 and 1: expected a distance of at least"
     ):
-        env.reset(options={"waypoints": [[0, 0], [1, 0], [1, 1]]})
-    np.testing.assert_array_equal(path(), drawn)
+        make(waypoints=[[0, 0], [1, 0], [1, 1]])
 
 
 def test_libraries_read_the_steps_of_an_episode():

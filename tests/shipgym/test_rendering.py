@@ -92,7 +92,10 @@ def test_a_picture_follows_from_seed_and_actions_and_changes_nothing():
 
 def test_a_window_opens_and_closes_without_a_screen(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    env = make(COURSE, render_mode="human")
+    with warnings.catch_warnings(
+        action="ignore"
+    ):  # Gymnasium's wrapper says it is used
+        env = make(COURSE, render_mode="human")
     env.reset(seed=0)
     env.step(np.zeros(1, dtype=np.float32))
     assert pygame.display.get_init()

@@ -166,7 +166,7 @@ def test_options_of_a_reset_are_those_of_single_environments():
     env, singles = ours(COURSE, 2), dummy(COURSE, 2)
     for ships in (env, singles):
         ships.seed(4)
-        ships.set_options({"course_change_deg": 3.0})
+        ships.set_options({"start": {"heading_error": 0.3}})
     np.testing.assert_array_equal(env.reset(), singles.reset())
     action = np.full((2, 1), 0.2, np.float32)
     for _ in range(20):

@@ -85,6 +85,10 @@ def test_infos_are_those_of_gymnasiums_own_vector_environment(mode):
     first = [env.reset(seed=8)[1] for env in (ours, theirs)]
     for infos, expected in [first, *(_infos(ours, theirs) for _ in range(50))]:
         seen, right = (each.pop("final_obs", []) for each in (infos, expected))
+        for name in ("episode_cost", "is_success"):  # of single ones in every step
+            for each in (infos, expected):
+                each.pop(name, None)
+                each.pop(f"_{name}", None)
         for row in np.flatnonzero(expected.get("_final_obs", [])):
             np.testing.assert_array_equal(seen[row], right[row])
         np.testing.assert_equal(infos, expected)
@@ -156,8 +160,5 @@ def test_rows_outside_of_a_mask_keep_all_that_they_show():
     assert infos["reward_heading"][0] == 0.0
     infos["_reward_heading"][:] = True
     assert mask.tolist() == [True, False, False]
-    with pytest.raises(
-        InputError,
-        match="options with a reset_mask of some rows: unknown key 'course_chan",
-    ):
+    with pytest.raises(InputError, match="options: unknown key 'course_chan"):
         env.reset(options={"reset_mask": mask, "course_change_deg": 5.0})
