@@ -34,6 +34,7 @@ HELD = 20  # control intervals for which a random order is held
 OFTEN = 0.05  # share of the steps in which a part of the reward may be positive
 SELDOM = 0.05  # share of the steps that a rare event has at most
 RARE = 20.0  # times the median of its magnitude that a rare reward is at least
+SIGNS = "are these costs? write them with a minus"  # a remark that is a warning too
 MOSTLY = 0.2  # share of all reward in rare events that learners cope with
 
 
@@ -64,7 +65,7 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
 def check_once(
     program: EpisodeProgram, model: ShipModel, task: Task, randomisation: Randomisation
 ) -> None:
-    """Check a task of a user's own if it is new: InputError, or warnings of remarks.
+    """Check a new task of a user's own: InputError, or a warning of wrong signs.
 
     A file in the cache folder stands for one that was sound.
     """
@@ -80,7 +81,8 @@ def check_once(
     if found.problems:
         raise InputError(found.problems[0])
     for remark in found.remarks:
-        warnings.warn(remark, stacklevel=4)
+        if SIGNS in remark:
+            warnings.warn(remark, stacklevel=4)
     if mark:
         mark.touch()
 
@@ -201,9 +203,8 @@ def _positive(engine: Engine, sailed: _Sailed) -> Iterator[str]:
             yield (
                 f"{source}: {name}: expected costs, written with a minus, got positive"
                 f" numbers in {100.0 * share:.0f} % of the steps, up to"
-                f" {parts.max():.3g}: are these costs? write them with a minus; a bonus"
-                " for each step is not needed, since the engine pays for steps of"
-                " little cost"
+                f" {parts.max():.3g}: {SIGNS}; a bonus for each step is not needed,"
+                " since the engine pays for steps of little cost"
             )
 
 
