@@ -9,7 +9,7 @@ import emcee
 import numpy as np
 
 from identification.arrays import rounded
-from identification.judging.model_error import FEWEST_TRIALS, model_error
+from identification.judging.model_error import FEWEST_TRIALS, holds_turn, model_error
 from identification.judging.uncertainty import Uncertainty
 from identification.models.sailed import (
     CoefficientPrior,
@@ -308,6 +308,11 @@ def with_posterior(
     chains = _chains(posterior, start, asked)
     mixing = mixing_of(chains)
     remarks = []
+    if not holds_turn(trials):
+        remarks.append(
+            "no trial turns through half a circle, and draws of a posterior are not"
+            " widened for that: do not rely on their hard turns"
+        )
     if not mixing.is_enough:
         remarks.append(
             f"posterior: the walkers did not mix in {mixing.steps} steps"
