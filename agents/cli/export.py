@@ -85,7 +85,7 @@ def export_command(
 def _source(what: str, name: str | None, depth: float) -> Source:
     """C99 of the controller, policy or model of a file or a name."""
     from agents.agent_file import list_pretrained, load_agent
-    from agents.export.autopilot_c99 import autopilot_source
+    from agents.export.autopilot import autopilot_source
     from agents.export.ship_c99 import ship_source
     from shipgym.errors import InputError
     from shipgym.files import kind_of

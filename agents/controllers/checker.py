@@ -4,21 +4,22 @@ It checks what rollouts, the benchmark and the tools of stable-baselines3 rely o
 """
 
 import inspect
-from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from agents.controllers.interface import Policy, check_names, check_scales
+from agents.controllers.interface import (
+    Policy,
+    check_names,
+    check_scales,
+    read_commands,
+)
 from shipgym import InputError, ShipModel
 from shipgym.checks import check_whole
 from shipgym.envs.engine import Engine
 from shipgym.models.by_name import ship_of
 from shipgym.tasks.task import Task, course_keeping_task
-
-Observations = NDArray[np.float32]
 
 N_SHIPS = 3
 
@@ -56,6 +57,13 @@ def check_controller(
     ship = ship_of("mariner" if model is None else model)
     asked = task or course_keeping_task()
     name = type(controller).__name__
+    check_signature(controller, name)
+    check_observations(controller, ship, asked, name)
+    check_episode(_Asking(controller, f"{name}.predict"), ship, asked, n_steps)
+
+
+def check_signature(controller: Any, name: str) -> None:
+    """Refuse a controller without `predict`, or with one of other arguments."""
     predict = getattr(controller, "predict", None)
     if not callable(predict):
         raise InputError(f"{name}: expected a method predict, got none")
@@ -68,12 +76,6 @@ def check_controller(
             f"{name}.predict: expected predict(observation, state=None,"
             f" episode_start=None, deterministic=True), got {signature}: {error}"
         ) from None
-    check_observations(controller, ship, asked, name)
-
-    method = f"{name}.predict"
-    asking = _Asking(controller, method)
-    engine = Engine(ship, N_SHIPS, asked)
-    asking.check_episode(engine, n_steps)
 
 
 def check_observations(
@@ -97,6 +99,28 @@ def check_observations(
     )
 
 
+def check_episode(asking: "_Asking", ship: ShipModel, task: Task, n_steps: int) -> None:
+    """Steer ships together and each alone, and begin another episode at the end."""
+    engine = Engine(ship, N_SHIPS, task)
+    seen: Any = engine.reset(np.arange(N_SHIPS))
+    state: Any = None
+    alone: list[Any] = [None] * N_SHIPS
+    begins = np.ones(N_SHIPS, dtype=np.bool_)
+    for step in range(n_steps):
+        starts = begins & (step == 0)
+        action, state = asking.answer(seen, state, starts, f"step {step}")
+        for i in range(N_SHIPS):
+            place = f"step {step}, ship {i} alone"
+            own, alone[i] = asking.answer(seen[i], alone[i], starts[:1], place)
+            asking.check_same(own, action[i], place)
+        seen, *_ = engine.step(action)
+
+    fresh, _ = asking.answer(seen, None, begins, "a first observation")
+    where = "episode_start True and the state of another episode"
+    begun, _ = asking.answer(seen, state, begins, where)
+    asking.check_same(begun, fresh, where)
+
+
 @dataclass(frozen=True)
 class _Asking:
     """Asks a controller, and refuses answers that nobody can rely on."""
@@ -104,87 +128,54 @@ class _Asking:
     controller: Policy
     who: str
 
-    def check_episode(self, engine: Engine, n_steps: int) -> None:
-        """Steer ships together and each alone, and begin another episode at the end."""
-        seen: Observations = engine.reset(np.arange(N_SHIPS))
-        state: Any = None
-        alone: list[Any] = [None] * N_SHIPS
-        begins = np.ones(N_SHIPS, dtype=np.bool_)
-        starts = begins
-        for step in range(n_steps):
-            where = f"step {step}"
-            action, state = self.answer(seen, state, starts, where)
-            for i in range(N_SHIPS):
-                place = f"{where}, ship {i} alone"
-                own, alone[i] = self.answer(seen[i], alone[i], starts[:1], place)
-                self.check_same(own, action[i], place)
-            seen, *_ = engine.step(action)
-            starts = ~begins
+    def answer(self, seen: Any, state: Any, starts: Any, where: str) -> tuple[Any, Any]:
+        """Action and state, asked for twice; the observation must not be changed."""
+        seen_before = seen.copy()
+        answers = []
+        for _ in range(2):
+            given = self.controller.predict(seen, state, starts, True)
+            try:
+                action, after = given
+            except (TypeError, ValueError):
+                got = type(given).__name__
+                raise self.refusal(where, "a pair: action and state", got) from None
+            action, fault = read_commands(action, (*seen.shape[:-1], 1))
+            if not fault and not np.abs(action).max() <= 1.0:
+                fault = (
+                    f"expected parts of the rudder limit in [-1, 1], got"
+                    f" {action.ravel()}; look for a division by zero"
+                )
+            if fault:
+                raise InputError(f"{self.who}, {where}: {fault}")
+            answers.append((action, after))
 
-        fresh, _ = self.answer(seen, None, begins, "a first observation")
-        where = "episode_start True and the state of another episode"
-        begun, _ = self.answer(seen, state, begins, where)
-        self.check_same(begun, fresh, where)
-
-    def answer(
-        self, seen: Any, state: Any, starts: Any, where: str
-    ) -> tuple[NDArray[np.float32], Any]:
-        """Action and state, computed three times; the inputs must not be changed."""
-        seen_before = deepcopy(seen)
-        state_before = deepcopy(state)
-        answer: Any = self.controller.predict(
-            seen, state=state, episode_start=starts, deterministic=True
-        )
-        is_pair = isinstance(answer, tuple) and len(answer) == 2
-        got = type(answer).__name__
-        self.require(is_pair, where, "a pair: action and state", got)
-        given, state_after = answer
-        action = self.checked(given, (*seen.shape[:-1], 1), where)
-
-        for memory in (state, state_before):
-            again, _ = self.controller.predict(seen, memory, starts, True)
-            self.require(
-                np.array_equal(np.asarray(again), action),
+        (action, after), (again, _) = answers
+        if not np.array_equal(again, action):
+            expected = f"the same action for the same state, {action.ravel()}"
+            raise self.refusal(
                 where,
-                f"the same action for the same state, {np.ravel(action)}",
-                f"{np.ravel(again)}; what it remembers belongs into the state that"
+                expected,
+                f"{again.ravel()}; what it remembers belongs into the state that"
                 " predict returns, and deterministic=True allows no chance",
             )
-        is_kept = np.array_equal(seen_before, seen)
-        change = "a changed one; work on a copy"
-        self.require(is_kept, where, "the observation left as it was", change)
-        return action, state_after
-
-    def checked(self, action: Any, shape: tuple[int, ...], where: str) -> Any:
-        """An action, which must be one finite number in [-1, 1] for each ship."""
-        try:
-            array = np.asarray(action, dtype=np.float64)
-        except (TypeError, ValueError):
-            array = np.array(np.nan)
-            self.require(False, where, "numbers", f"{action!r}")
-        fits = array.shape == shape
-        self.require(fits, where, f"an action of shape {shape}", f"shape {array.shape}")
-        got = f"{array.ravel()}"
-        hint = f"{got}; look for a division by zero"
-        self.require(np.isfinite(array).all(), where, "finite numbers", hint)
-        is_part = np.abs(array).max() <= 1.0
-        self.require(is_part, where, "parts of the rudder limit in [-1, 1]", got)
-        return np.asarray(action)
+        if not np.array_equal(seen_before, seen):
+            change = "a changed one; work on a copy"
+            raise self.refusal(where, "the observation left as it was", change)
+        return action, after
 
     def check_same(self, found: Any, expected: Any, where: str) -> None:
         """Refuse another answer than that to the same question otherwise."""
         # of the rudder limit: matrix products of learned policies depend on how many
         # rows there are
         rounding = 1e-5
-        self.require(
-            np.allclose(found, expected, rtol=0.0, atol=rounding),
-            where,
-            f"{np.ravel(expected)} as otherwise",
-            f"{np.ravel(found)}; rows of a batch and episodes must be independent of"
-            " each other",
-        )
+        if not np.allclose(found, expected, rtol=0.0, atol=rounding):
+            raise self.refusal(
+                where,
+                f"{np.ravel(expected)} as otherwise",
+                f"{np.ravel(found)}; rows of a batch and episodes must be independent"
+                " of each other",
+            )
 
-    def require(self, is_met: Any, where: str, expected: str, got: str) -> None:
-        """Refuse a controller that does not meet a requirement."""
-        if not is_met:
-            raise InputError(f"{self.who}, {where}: expected {expected}, got {got}")
+    def refusal(self, where: str, expected: str, got: str) -> InputError:
+        """Error of a controller that does not meet a requirement."""
+        return InputError(f"{self.who}, {where}: expected {expected}, got {got}")

@@ -1,7 +1,7 @@
 """Common part of the classical autopilots: from observations to the rudder."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.helm import CORNERS, HelmSettings, helm_of
-from agents.controllers.interface import check_names, check_scales, model_hash
+from agents.controllers.interface import Fitting, model_hash
 from agents.controllers.law import (
     Gains,
     HelmMemory,
@@ -48,6 +48,16 @@ Action = NDArray[np.float32]
 
 FORMAT = 1  # of the controller file
 SMALL = 1e-5  # rad, and other SI units, of motions about straight running
+#: Fields that the file holds as they are.
+PLAIN = (
+    "kind",
+    "observation_names",
+    "observation_scales",
+    "gains",
+    "neutral_rudder",
+    "neutral_sway",
+    "design",
+)
 UNKNOWN_MARGINS = Margins(np.nan, np.nan, np.nan, np.nan, np.nan)
 
 
@@ -60,10 +70,11 @@ class Bounds(NamedTuple):
 
 #: Of gains and other numbers that no controller says more about, SI units.
 ANY_NUMBER = Bounds(-1e9, 1e9)
+POSITIVE = Bounds(1e-6, 1e9)
 
 
 @dataclass(frozen=True, eq=False)
-class Controller:
+class Controller(Fitting):
     """Feedback of deviations from straight running to the commanded rudder.
 
     A controller keeps no state: what there is to remember of each ship is in the state
@@ -113,9 +124,8 @@ class Controller:
     has_autopilot: ClassVar[bool] = False
     #: Whether the file holds its design model too, its `ship`.
     has_ship: ClassVar[bool] = False
-    #: Arrays that the file holds beside the gains: names of fields, and their axes: a
-    #: length, or its name.
-    arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {}
+    #: Fields that are arrays, which the file holds too, and how many axes they have.
+    arrays: ClassVar[Mapping[str, int]] = {}
     #: What it needs of `design`, with bounds; also bounds of gains that are not any
     #: number.
     bounds: ClassVar[Mapping[str, Bounds]] = {"dt": Bounds(1e-3, 1e4)}
@@ -217,6 +227,11 @@ class Controller:
         """Count of the numbers that `predict` keeps of each ship in its state."""
         return size_of(self.memory_record)
 
+    @property
+    def memory_names(self) -> list[str]:
+        """Names of the numbers that it keeps of each ship."""
+        return [name.rpartition(".")[2] for name in leaves(self.memory_record)]
+
     @cached_property
     def parameters(self) -> Any:
         """Parameters of its law, a record."""
@@ -301,7 +316,7 @@ class Controller:
 
         Its model of the gear follows that order then. `action`: shape (..., 1).
         """
-        names = [name.rpartition(".")[2] for name in leaves(self.memory_record)]
+        names = self.memory_names
         if "given" not in names:
             return state
         told = np.array(state)
@@ -338,9 +353,6 @@ class Controller:
         columns = (first * self.observation_scales).T
         return dict(zip(self.observation_names, columns, strict=True))
 
-    def reset(self) -> None:
-        """Return the state with which an episode begins: None."""
-
     def loop(self) -> Compensator:
         """Linear controller for small motions, without limits, for the margins.
 
@@ -353,8 +365,7 @@ class Controller:
         gains |= {name: unlimited[name] for name in unlimited if name in gains}
         small_law = replace(self, gains=gains)
         n_signals = len(SIGNALS)
-        names = [name.rpartition(".")[2] for name in leaves(self.memory_record)]
-        remembered = np.array(names) != "started"
+        remembered = np.array(self.memory_names) != "started"
         n_inputs = n_signals + int(remembered.sum())
         small = SMALL * np.eye(n_inputs)
         above = small_law._response(small, remembered)
@@ -415,40 +426,14 @@ class Controller:
         name = f"{type(self).__name__} on model '{model.name}'"
         return self.loop().margins(sample_ship(model, self.design["dt"]), name)
 
-    def check_fits(
-        self, names: Sequence[str], scales: Sequence[float], where: str = "observations"
-    ) -> None:
-        """Refuse other quantities or scales than those designed for.
-
-        Raises InputError, which names the first difference.
-
-        Parameters
-        ----------
-        names, scales : sequence
-            `observation_names` and `observation_scales` of an environment; it may show
-            more than what is steered by.
-        where : str
-            Start of the message.
-        """
-        own_names = self.observation_names
-        check_names(names[: len(own_names)], own_names, where)
-        remedy = (
+    @property
+    def remedy(self) -> str:
+        """What to do where it does not fit."""
+        return (
             f"controller '{self.name}' was designed on another ship or rudder limit"
             f" (model '{self.model_name}'); design one on this model with"
             f" {type(self).__name__}.from_model"
         )
-        check_scales(
-            names,
-            scales,
-            own=self.observation_scales,
-            where=where,
-            remedy=remedy,
-        )
-
-    def check_fits_model(self, model: ShipModel) -> None:
-        """Refuse a ship of another length, service speed or rudder limit."""
-        scales = observation_scales(model).tolist()
-        self.check_fits(OBSERVATION_NAMES, scales, f"model '{model.name}'")
 
     def save(self, path: str | Path) -> None:
         """Write the controller as a JSON file (fields: docs/deployment.md).
@@ -462,15 +447,9 @@ class Controller:
         margins = asdict(self.margins)
         content = {
             "format": FORMAT,
-            "kind": self.kind,
-            "observation_names": list(self.observation_names),
-            "observation_scales": list(self.observation_scales),
-            "gains": self.gains,
-            "neutral_rudder": self.neutral_rudder,
-            "neutral_sway": self.neutral_sway,
+            **{name: getattr(self, name) for name in PLAIN},
             "model": {"name": self.model_name, "sha256": self.model_sha256},
             "margins": {name: finite(value) for name, value in margins.items()},
-            "design": self.design,
         }
         if self.arrays:
             arrays = {name: getattr(self, name).tolist() for name in self.arrays}

@@ -9,8 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from agents.controllers.controller import ANY_NUMBER, FORMAT, Bounds, Controller
-from agents.controllers.helm import HELM_BOUNDS
+from agents.controllers.controller import (
+    ANY_NUMBER,
+    FORMAT,
+    PLAIN,
+    Bounds,
+    Controller,
+)
+from agents.controllers.helm import HELM
 from agents.controllers.interface import check_names
 from agents.controllers.margins import Margins
 from agents.controllers.registry import controller_class, controller_kinds
@@ -25,7 +31,6 @@ from shipgym.checks import (
     check_text,
     placed,
     quoted,
-    shown,
     unexpected,
 )
 
@@ -33,18 +38,7 @@ REMEDY = "design the controller again or take another copy"
 #: The kind of file that `agents.policies.policy_file` reads.
 LEARNED = "learned"
 FINITE = Bounds(-np.inf, np.inf)
-FIELDS = (
-    "format",
-    "kind",
-    "observation_names",
-    "observation_scales",
-    "gains",
-    "neutral_rudder",
-    "neutral_sway",
-    "model",
-    "margins",
-    "design",
-)
+FIELDS = ("format", *PLAIN, "model", "margins")
 
 
 def read_controller(content: Mapping[str, Any], where: str) -> Controller:
@@ -60,16 +54,13 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
     }
     expected = (*FIELDS, *[name for name, present in further.items() if present])
     check_keys(content, expected, where, expected)
-    given = content["observation_names"]
-    if not isinstance(given, list):
-        raise unexpected(f"{where}: observation_names", "a list of names", given)
-    names = tuple(map(str, given))
+    with placed(where):
+        names = read_names(content["observation_names"])
     more = tuple(name for name in design.may_observe if name in names)
     check_names(names, design.observes + more, f"{where}: observation_names")
 
-    gains = dict.fromkeys(design.gain_names or design.feedback, ANY_NUMBER)
-    if not design.gain_names:
-        gains |= {name: Bounds(*ends) for name, ends in HELM_BOUNDS.items()}
+    gain_names = design.gain_names or (*design.feedback, *HELM)
+    gains = dict.fromkeys(gain_names, ANY_NUMBER)
     needed = {name: one for name, one in design.bounds.items() if name not in gains}
     gains |= {name: one for name, one in design.bounds.items() if name in gains}
     rudder = Bounds(-np.pi, np.pi)  # rad
@@ -121,25 +112,17 @@ def _parts(content: Mapping[str, Any], design: type[Controller]) -> dict[str, An
     return parts
 
 
-def _arrays(value: Any, axes_of: Mapping[str, tuple[str | int, ...]]) -> dict[str, Any]:
-    """Arrays of numbers, whose axes of one name have one length."""
-    table = check_table(value, "arrays", axes_of, axes_of)
-    lengths: dict[Any, int] = {}  # of named axes
+def _arrays(value: Any, n_axes: Mapping[str, int]) -> dict[str, Any]:
+    """Arrays of numbers by name; their class checks how long they are."""
+    table = check_table(value, "arrays", n_axes, n_axes)
     arrays = {}
-    for name, axes in axes_of.items():
+    for name, n in n_axes.items():
         where = f"arrays.{name}"
-        shape = [axis if isinstance(axis, int) else lengths.get(axis) for axis in axes]
-        array = check_array(table[name], tuple(shape), where)
-        fits = array.ndim == len(axes) and array.size > 0
-        if fits:
-            sizes = zip(axes, array.shape, strict=True)
-            fits = all(n == lengths.setdefault(axis, n) for axis, n in sizes)
-        if not fits or np.abs(array).max() > ANY_NUMBER.largest:
-            expected = ", ".join(map(str, axes))
-            raise InputError(
-                f"{where}: expected numbers of magnitude {ANY_NUMBER.largest:g} at"
-                f" most, of shape ({expected}), got shape {array.shape}; {REMEDY}"
-            )
+        axes = (None,) * n
+        array = check_array(table[name], axes, where)
+        largest = np.abs(array).max(initial=0.0)
+        place = f"{where}: largest"
+        check_number(float(largest), place, at_most=ANY_NUMBER.largest)
         arrays[name] = array
     return arrays
 
@@ -155,20 +138,23 @@ def read_model(value: Any) -> dict[str, str]:
     return texts
 
 
+def read_names(value: Any) -> tuple[str, ...]:
+    """Names of observations."""
+    if not isinstance(value, list):
+        raise unexpected("observation_names", "a list of names", value)
+    return tuple(map(str, value))
+
+
 def read_scales(value: Any, names: tuple[str, ...]) -> tuple[float, ...]:
     """Observation scales, positive numbers, one for each name."""
     where = "observation_scales"
-    expected = f"expected {len(names)} numbers"
-    if not isinstance(value, list):
-        raise InputError(f"{where}: {expected}, got {shown(value)}")
-    if len(value) != len(names):
-        raise InputError(f"{where}: {expected}, got {len(value)}")
-
+    check_array(value, (len(names),), where)
     bounds = Bounds(1e-9, 1e9)
     scales = []
-    for i, name in enumerate(names):
-        place = f"{where}[{i}] ('{name}')"
-        scales.append(_number(value[i], bounds, place))
+    for name, one in zip(names, value, strict=True):
+        place = f"{where}: '{name}'"
+        scale = _number(one, bounds, place)
+        scales.append(scale)
     return tuple(scales)
 
 
@@ -193,11 +179,13 @@ def _numbers(value: Any, needed: Mapping[str, Bounds], where: str) -> dict[str, 
 
 def _margins(value: Any) -> Margins:
     """Margins; null is no limit."""
-    needed = {margin.name: FINITE for margin in fields(Margins)}
-    table = dict(check_table(value, "margins", needed))
-    unlimited = {}
-    for name in list(table):
-        if table[name] is None:
-            del table[name], needed[name]
-            unlimited[name] = np.inf
-    return Margins(**_numbers(table, needed, "margins"), **unlimited)
+    names = [margin.name for margin in fields(Margins)]
+    table = check_table(value, "margins", names, names)
+    limits = {}
+    for name, limit in table.items():
+        if limit is None:
+            limits[name] = np.inf
+            continue
+        place = f"margins.{name}"
+        limits[name] = _number(limit, FINITE, place)
+    return Margins(**limits)

@@ -1,32 +1,19 @@
 """Classical controllers by name, designed for the ship and the path of a task."""
 
-import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Any
 
 from agents.controllers.controller import Controller
-from agents.controllers.interface import model_hash
 from agents.controllers.law import linear_law
 from agents.controllers.registry import controller_class
 from agents.suites.suite import BenchmarkTask, load_tuned
-from shipgym import InputError, ShipModel
+from shipgym import InputError
 from shipgym.checks import quoted
 from shipgym.tasks.task import Task
 
-#: Of these, no bases for policies unless asked for by name: MPC simulates, an action
-#: takes it 97 us where wheel-over needs 2.
+#: Of these, no bases for policies unless asked for by name: MPC simulates.
 NO_BASES = ("mpc",)
 INNER = "lq_"  # before settings of the LQ that guidance leads
-
-
-@dataclass(frozen=True)
-class _Ship:
-    """A ship that equals another of the same numbers."""
-
-    model: ShipModel = field(compare=False)
-    sha256: str  # of its numbers
 
 
 def design(
@@ -50,11 +37,10 @@ def design(
     made: Any = controller_class(kind)
     given = dict(settings or for_sea(made, task.task))
     if not made.has_autopilot:
-        sha256 = model_hash(task.ship)
-        ship = _Ship(task.ship, sha256)
-        interval = task.task.interval(task.ship)
-        text = json.dumps(given, sort_keys=True)
-        return _designed(made, ship, interval, text)
+        found: Controller = made.from_model(
+            task.ship, dt=task.task.interval(task.ship), **given
+        )
+        return found
     if not task.task.follows_path:
         raise no_path(kind, task)
 
@@ -90,12 +76,6 @@ def _divided(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any
         else:
             own[name] = value
     return own, inner
-
-
-@lru_cache(maxsize=256)
-def _designed(kind: Any, ship: _Ship, dt: float, settings: str) -> Controller:
-    made: Controller = kind.from_model(ship.model, dt=dt, **json.loads(settings))
-    return made
 
 
 def tuned(kind: str, task: BenchmarkTask, suite: str, run: int = 0) -> Controller:

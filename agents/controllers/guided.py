@@ -14,7 +14,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.controller import ANY_NUMBER, Action, Bounds, Controller
+from agents.controllers.controller import POSITIVE, Action, Bounds, Controller
 from agents.controllers.law import (
     Law,
     Number,
@@ -75,8 +75,7 @@ class Guided(Controller):
     has_autopilot: ClassVar[bool] = True
     bounds: ClassVar[Mapping[str, Bounds]] = {
         **Controller.bounds,
-        "lookahead": Bounds(1e-6, ANY_NUMBER.largest),
-        "task_lookahead": Bounds(1e-6, ANY_NUMBER.largest),
+        **dict.fromkeys(("lookahead", "task_lookahead"), POSITIVE),
     }
 
     autopilot: Controller  # steers by the first eight observations
@@ -256,10 +255,6 @@ class Guided(Controller):
     def loop(self) -> Compensator:
         """Loop of the heading autopilot: guidance is slower by far."""
         return self.autopilot.loop()
-
-    def check_fits_model(self, model: ShipModel) -> None:
-        """Refuse a ship that the autopilot was not designed for."""
-        self.autopilot.check_fits_model(model)
 
     def to_dict(self) -> dict[str, Any]:
         """Content of the file, of guidance and autopilot."""

@@ -14,18 +14,19 @@ from agents.controllers.law import Biquad, Helm
 from agents.settings import Settings, Step, setting
 from shipgym import ShipModel
 from shipgym.checks import check_number
+from shipgym.instruments.noise import SEA_TRIAL
 
-#: Gains of the helm in a controller's file, with their bounds.
-HELM_BOUNDS = {
-    "rudder_update": (1e-6, 1.0),
-    "rudder_band": (0.0, np.pi),
-    "wave_period": (0.0, 1e6),
-    "wave_corner": (1e-3, 1e3),
-    "schedule": (0.0, 1.0),
-    "gear_share": (1e-6, 1.0),
-    "gear_step": (1e-9, 1e6),
-}
-SHORTEST_WAVE, LONGEST_WAVE = 1.0, 60.0  # s, with which a sea is met
+#: Gains of the helm in a controller's file.
+HELM = (
+    "rudder_update",
+    "rudder_band",
+    "wave_period",
+    "wave_corner",
+    "schedule",
+    "gear_share",
+    "gear_step",
+)
+LONGEST_WAVE = 60.0  # s, with which a sea is met
 #: Corners of the wave filter that are tried, over the frequency of the waves.
 CORNERS = (0.5, 0.7, 1.0, 1.4, 2.0)
 
@@ -36,9 +37,10 @@ class HelmSettings(Settings):
 
     wave_period: float | None = setting(
         "of the waves as they are met, s, whose yawing is not answered with rudder; by"
-        " default that of the task's sea, without one no filter",
+        " default that of the task's sea, else that which the trials show, else 0: no"
+        " filter",
         None,
-        at_least=SHORTEST_WAVE,
+        at_least=0.0,
         at_most=LONGEST_WAVE,
         search=Step(0.3, reach=3.0),
     )
@@ -54,12 +56,16 @@ class HelmSettings(Settings):
 
         Raises InputError for a wave that the interval cannot follow.
         """
-        if self.wave_period is not None:
+        period = self.wave_period
+        if period is None:
+            shown = logged(model, "wave_period")
+            period = shown if shown > 2.0 * dt else 0.0
+        elif period > 0.0:
             check_number(
-                self.wave_period,
+                period,
                 "wave_period",
                 above=2.0 * dt,
-                hint="two control intervals, in s",
+                hint="two control intervals, in s; 0 for no filter",
             )
         gear = model.steering
         lag = gear.time_constant
@@ -67,12 +73,41 @@ class HelmSettings(Settings):
         return {
             "rudder_update": 1.0,
             "rudder_band": 0.0,
-            "wave_period": self.wave_period or 0.0,
+            "wave_period": period,
             "wave_corner": CORNERS[0],
             "schedule": self.schedule,
             "gear_share": float(share),
             "gear_step": gear.rate * dt,
         }
+
+
+def noise_setting(search: Step | None = None) -> Any:
+    """Setting of designs that know their sensors."""
+    return setting(
+        "of heading and yaw rate, in multiples of a sea trial's sensors (`SEA_TRIAL`);"
+        " by default what the trials of the model show, at least 1 and at most 10",
+        None,
+        above=0.0,
+        search=search,
+    )
+
+
+def logged_noise(model: ShipModel) -> float:
+    """Noise of heading and yaw rate in a model's trials, as settings have it.
+
+    The larger of the two, and at least 1: what a log smooths, the autopilot still sees.
+    """
+    heading = logged(model, "noise", "psi") / SEA_TRIAL["heading"]
+    yaw_rate = logged(model, "noise", "r") / SEA_TRIAL["yaw_rate"]
+    return float(np.clip(max(heading, yaw_rate), 1.0, 10.0))
+
+
+def logged(model: ShipModel, *place: str) -> float:
+    """Number in a model's provenance; 0 where there is none."""
+    found: Any = model.provenance or {}
+    for name in place:
+        found = found.get(name, {}) if isinstance(found, Mapping) else {}
+    return check_number(found or 0.0, f"provenance.{'.'.join(place)}", at_least=0.0)
 
 
 def known(settings: Settings) -> dict[str, float]:

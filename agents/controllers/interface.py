@@ -7,7 +7,11 @@ import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from shipgym.errors import InputError
+from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
 
 if TYPE_CHECKING:
     from shipgym import ShipModel
@@ -62,6 +66,52 @@ def after_order(policy: Policy, state: Any, action: Any) -> Any:
     return state if follow is None else follow(state, action)
 
 
+class Fitting:
+    """An agent that knows its observations, and refuses others."""
+
+    observation_names: tuple[str, ...]
+    observation_scales: tuple[float, ...]
+
+    @property
+    def remedy(self) -> str:
+        """What to do where it does not fit."""
+        raise NotImplementedError
+
+    def check_fits(
+        self, names: Sequence[str], scales: Sequence[float], where: str = "observations"
+    ) -> None:
+        """Refuse other quantities or scales than its own.
+
+        Raises InputError, which names the first difference.
+
+        Parameters
+        ----------
+        names, scales : sequence
+            `observation_names` and `observation_scales` of an environment; it may show
+            more than what is steered by.
+        where : str
+            Start of the message.
+        """
+        own = self.observation_names
+        check_names(names[: len(own)], own, where)
+        check_scales(names, scales, self.observation_scales, where, self.remedy)
+
+    def check_fits_model(self, model: ShipModel) -> None:
+        """Refuse a ship of another length, service speed or rudder limit."""
+        scales = observation_scales(model).tolist()
+        shown = dict(zip(OBSERVATION_NAMES, scales, strict=True))
+        own = dict(zip(self.observation_names, self.observation_scales, strict=True))
+        both = [name for name in own if name in shown]
+        where = f"model '{model.name}'"
+        check_scales(
+            both,
+            scales=[shown[name] for name in both],
+            own=[own[name] for name in both],
+            where=where,
+            remedy=self.remedy,
+        )
+
+
 def check_fits(policy: Any, task: Task, ship: ShipModel, where: str) -> None:
     """Refuse a policy made for other observations than a task shows of a ship.
 
@@ -75,6 +125,21 @@ def check_fits(policy: Any, task: Task, ship: ShipModel, where: str) -> None:
     names = [quantity.name for quantity in shown]
     scales = [quantity.scale for quantity in shown]
     check(names, scales, where)
+
+
+def read_commands(
+    actions: Any, shape: tuple[int, ...]
+) -> tuple[NDArray[np.float32], str]:
+    """What a policy returned as numbers, else NaN, and what is wrong with it."""
+    nothing = np.full(shape, np.nan, dtype=np.float32)
+    try:
+        with np.errstate(over="ignore"):
+            values = np.array(actions, dtype=np.float32)
+    except (TypeError, ValueError):
+        return nothing, f"expected an array of numbers, got {type(actions).__name__}"
+    if values.shape != shape:
+        return nothing, f"expected actions of shape {shape}, got {values.shape}"
+    return values, ""
 
 
 def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> None:

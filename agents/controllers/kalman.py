@@ -35,19 +35,6 @@ class KalmanFilter:
     process: Floats
     output: Floats
 
-    def gain(self, noise: float) -> tuple[Floats, Floats]:
-        """Stationary gain, and standard deviations of the innovations.
-
-        `noise`: in multiples of a sea trial's sensors.
-        """
-        deviations = noise * np.array([SEA_TRIAL["yaw_rate"], SEA_TRIAL["heading"]])
-        return kalman_gain(
-            transition=self.transition,
-            process=self.process,
-            output=self.output,
-            noise=np.diag(deviations**2),
-        )
-
 
 def course_filter(
     model: ShipModel, about: StraightRunning, dt: float, disturbance: float
@@ -155,19 +142,14 @@ def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floa
     return transition, driven
 
 
-def kalman_gain(
-    transition: Floats, process: Floats, output: Floats, noise: Floats
-) -> tuple[Floats, Floats]:
+def kalman_gain(states: KalmanFilter, noise: float) -> tuple[Floats, Floats]:
     """Stationary Kalman gain for the estimate at the time of the measurement.
 
     Parameters
     ----------
-    transition : array of shape (n, n)
-    process : array of shape (n, n)
-        Covariance of what disturbs the states in an interval.
-    output : array of shape (m, n)
-    noise : array of shape (m, m)
-        Covariance of the measurements' noise.
+    states : KalmanFilter
+    noise : float
+        Of the measurements, in multiples of a sea trial's sensors.
 
     Returns
     -------
@@ -178,11 +160,23 @@ def kalman_gain(
     """
     import control
 
-    disturbed = np.eye(len(transition))  # each state by its own disturbance
-    _, covariance, _ = control.dlqe(transition, disturbed, output, process, noise)
+    sensors = np.array([SEA_TRIAL["yaw_rate"], SEA_TRIAL["heading"]])
+    measured = noise * sensors
+    of_noise = np.diag(measured**2)
+    n = len(states.transition)
+    disturbed = np.eye(n)  # each state by its own disturbance
+    _, covariance, _ = control.dlqe(
+        states.transition,
+        disturbed,
+        states.output,
+        states.process,
+        of_noise,
+    )
+    output = states.output
     of_output = output @ covariance
-    innovation = of_output @ output.T + noise
+    innovation = of_output @ output.T + of_noise
     solved = np.linalg.solve(innovation, of_output)
     gain: Floats = solved.T
     variances = np.diag(innovation)
-    return gain, np.sqrt(variances)
+    deviations = np.sqrt(variances)
+    return gain, deviations

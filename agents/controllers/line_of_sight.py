@@ -5,14 +5,13 @@ underactuated marine surface vessels in the presence of constant ocean currents,
 IEEE Conference on Decision and Control.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from agents.controllers.controller import ANY_NUMBER, Bounds, Controller
+from agents.controllers.controller import Controller
 from agents.controllers.guided import (
     Guided,
     lookahead_setting,
@@ -94,10 +93,6 @@ class IntegralLineOfSight(Guided):
     law: ClassVar[Any] = staticmethod(integral_line_of_sight)
     memory_record: ClassVar[Record] = DriftMemory
     gain_names: ClassVar[tuple[str, ...]] = (*Guided.gain_names, "integral")
-    bounds: ClassVar[Mapping[str, Bounds]] = {
-        **Guided.bounds,
-        "integral": Bounds(0.0, ANY_NUMBER.largest),
-    }
 
     @classmethod
     @takes_name

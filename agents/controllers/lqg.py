@@ -12,9 +12,9 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from agents.controllers.controller import Bounds, Controller
-from agents.controllers.helm import known
-from agents.controllers.kalman import course_filter, with_waves
+from agents.controllers.controller import POSITIVE, Bounds, Controller
+from agents.controllers.helm import known, logged_noise, noise_setting
+from agents.controllers.kalman import course_filter, kalman_gain, with_waves
 from agents.controllers.law import (
     HelmMemory,
     LinearFeedback,
@@ -152,12 +152,7 @@ def product(row: Any, states: Any) -> Number:
 class LQGSettings(SteeringCost):
     """Settings of LQG: the weights of LQ, and what its filter expects."""
 
-    noise: float = setting(
-        "of heading and yaw rate, in multiples of a sea trial's sensors (`SEA_TRIAL`)",
-        1.0,
-        above=0.0,
-        search=Step(1.0),
-    )
+    noise: float | None = noise_setting(search=Step(1.0))
     disturbance_deg: float | None = setting(
         "how much the sea pushes the ship: standard deviation of a rudder angle, drawn"
         " in each interval, that would do the same; more makes the filter trust what"
@@ -177,6 +172,8 @@ class LQGSettings(SteeringCost):
         the margins of LQ (loop transfer recovery).
         """
         own = super().completed(model, dt)
+        if own.noise is None:
+            own = replace(own, noise=logged_noise(model))
         if own.disturbance_deg is not None:
             return own
         for deviation in (2.0, 4.0, 8.0, 16.0, 32.0, 64.0):
@@ -217,15 +214,15 @@ class LQG(Controller):
     law: ClassVar[Any] = staticmethod(lqg_law)
     memory_record: ClassVar[Record] = LQGMemory
     reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "surge")
-    arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {
-        "transition": ("states", "states"),
-        "input": ("states",),
-        "kalman": ("states", len(Measured._fields)),
-        "output": (len(Measured._fields), "states"),
+    arrays: ClassVar[Mapping[str, int]] = {
+        "transition": 2,
+        "input": 1,
+        "kalman": 2,
+        "output": 2,
     }
     bounds: ClassVar[Mapping[str, Bounds]] = {
         **Controller.bounds,
-        "new_course_rad": Bounds(1e-6, 1e6),
+        "new_course_rad": POSITIVE,
     }
 
     transition: Floats
@@ -235,10 +232,14 @@ class LQG(Controller):
 
     def __post_init__(self) -> None:
         n = len(self.input)
-        n_states = (3, 5)  # sway, yaw rate and heading error; in waves two more
-        if n not in n_states:
+        n_measured = len(Measured._fields)
+        shapes = ((n, n), (n,), (n, n_measured), (n_measured, n))
+        found = tuple([getattr(self, name).shape for name in self.arrays])
+        # sway, yaw rate and heading error; in waves two more
+        if n not in (3, 5) or found != shapes:
             raise InputError(
-                f"arrays.input: expected one of {n_states} states, got {n}"
+                f"arrays: expected {', '.join(self.arrays)} of 3 or 5 states, got"
+                f" shapes {found}"
             )
         trusted = np.eye(n) - self.kalman @ self.output
         of_errors = trusted @ self.transition
@@ -274,16 +275,17 @@ class LQG(Controller):
         disturbance = float(np.radians(given.disturbance_deg))
         helm = {**own.helm(model, interval), "wave_period": 0.0}  # the filter has it
         states = course_filter(model, ship.about, interval, disturbance)
-        if own.wave_period is not None:
+        if own.wave_period:
             deviation = np.radians(own.wave_heading_deg)
             states = with_waves(states, own.wave_period, deviation, interval)
-        gain, deviations = states.gain(own.noise)
+        gain, deviations = kalman_gain(states, given.noise)
+        new_course = max(NEW_COURSE, GATE * deviations[1])
 
         return cls.designed(
             model,
             ship,
             {**own.gains(ship, model.travel_time), **helm},
-            {**known(own), "new_course_rad": max(NEW_COURSE, GATE * deviations[1])},
+            {**known(own), "new_course_rad": new_course},
             transition=states.transition,
             input=states.effect,
             kalman=gain,

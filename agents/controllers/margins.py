@@ -228,18 +228,12 @@ def bandwidth(omega: Floats, size: Floats) -> float:
     if len(below) == 0:
         return float(omega[-1])
     first = below[0]
-    if first == 0:
-        return float(omega[0])
-
-    low = size[first]
-    high = size[first - 1]
-    share = (high - half_power) / (high - low)
-
-    first_below = omega[first]
-    last_above = omega[first - 1]
-    step = np.log(first_below / last_above)
-    logarithm = np.log(last_above) + share * step
-    return float(np.exp(logarithm))
+    last_above = max(first - 1, 0)
+    around = [first, last_above]
+    logarithms = np.log(omega[around])
+    sizes = size[around]
+    found = np.interp(half_power, sizes, logarithms)
+    return float(np.exp(found))
 
 
 def _transfer(A: Floats, B: Floats, z: Complexes) -> Complexes:

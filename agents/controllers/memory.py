@@ -38,10 +38,14 @@ def to_rows(record: Any, n_ships: int) -> Floats:
 
     A number in place of a column is that of all ships.
     """
-    columns = list(_columns(record))
-    rows = np.zeros((n_ships, len(columns)))
-    for i, column in enumerate(columns):
-        rows[:, i] = column
+    columns = []
+    for one in _columns(record):
+        column = np.broadcast_to(one, n_ships)
+        columns.append(column)
+    shape = (len(columns), n_ships)
+    array = np.array(columns, dtype=np.float64)
+    whole = array.reshape(shape)
+    rows: Floats = whole.T
     return rows
 
 
@@ -100,17 +104,13 @@ def checked_starts(starts: Any, shape: tuple[int, ...]) -> Flags:
 
     None means that none begins; one flag counts for all ships.
     """
-    if starts is None:
-        return np.zeros(shape, dtype=np.bool_)
-    flags = np.asarray(starts, dtype=np.bool_)
+    flags = np.asarray(starts, dtype=np.bool_)  # False of None
     n = int(np.prod(shape))
-    if flags.size == n:
-        return np.array(flags.reshape(shape))
-    if flags.size == 1:
-        return np.full(shape, flags.item())
-    raise InputError(
-        f"episode_start: expected one for each of {n} ships, got {flags.size}"
-    )
+    if flags.size not in (1, n):
+        raise InputError(
+            f"episode_start: expected one for each of {n} ships, got {flags.size}"
+        )
+    return np.broadcast_to(flags.ravel(), n).reshape(shape)
 
 
 def checked_memory(memory: Any, shape: tuple[int, ...]) -> NDArray[Any]:

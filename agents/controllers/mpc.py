@@ -14,12 +14,12 @@ control, Journal of Guidance, Control, and Dynamics 40 (sampling on the model).
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from agents.controllers.controller import Bounds, Controller
+from agents.controllers.controller import ANY_NUMBER, POSITIVE, Bounds, Controller
 from agents.controllers.guided import bend, with_path
 from agents.controllers.law import (
     HelmMemory,
@@ -66,16 +66,6 @@ class PlanMemory(NamedTuple):
     plan: table_of(KNOTS)  # type: ignore[valid-type]  # rad, added to the course at the knots
 
 
-class PathCosts(NamedTuple):
-    """Weights of the cost of a step of a plan, as the task has them."""
-
-    corridor: float  # m
-    rudder: float  # per rad^2
-    rudder_rate: float  # per rad^2 in the time to travel one ship length
-    rudder_travel: float  # per rad in a control interval
-    roll: float  # per rad^2
-
-
 @dataclass(frozen=True)
 class MPCSettings(WheelOverSettings):
     """Settings of MPC: those of wheel-over, and of the search of plans."""
@@ -107,13 +97,11 @@ class MPC(WheelOver):
     bounds: ClassVar[Mapping[str, Bounds]] = {
         **WheelOver.bounds,
         "horizon_steps": Bounds(1, 1000),
-        "deviation": Bounds(0.0, FAR),
-        "water_depth": Bounds(0.0, FAR),
-        "corridor": Bounds(1e-6, FAR),
-        "rudder": Bounds(0.0, FAR),
-        "rudder_rate": Bounds(0.0, FAR),
-        "rudder_travel": Bounds(0.0, FAR),
-        "roll": Bounds(0.0, FAR),
+        "corridor": POSITIVE,
+        "water_depth": POSITIVE,
+        **dict.fromkeys(
+            ("deviation", "rudder", "rudder_rate", "rudder_travel", "roll"), ANY_NUMBER
+        ),
     }
 
     ship: ShipModel
@@ -157,15 +145,9 @@ class MPC(WheelOver):
             "horizon_steps": float(max(1, steps)),
             "deviation": float(np.radians(own["deviation_deg"])),
             "water_depth": min(asked.water_depth, DEEP),
-            **path_costs(asked, model)._asdict(),
+            **path_costs(asked, model),
         }
         return replace(guide, design=design)
-
-    @cached_property
-    def costs(self) -> PathCosts:
-        """Weights of the cost of a step."""
-        weights = {name: self.design[name] for name in PathCosts._fields}
-        return PathCosts(**weights)
 
     def to_dict(self) -> dict[str, Any]:
         """Content of the file, with the design model."""
@@ -292,19 +274,21 @@ def cheapest(plans: Floats, costs: Floats) -> Floats:
     return np.take_along_axis(plans, elites, axis=1)
 
 
-def path_costs(task: Task, model: ShipModel) -> PathCosts:
-    """Weights of the cost of a step in a task.
+def path_costs(task: Task, model: ShipModel) -> dict[str, float]:
+    """Half width of the corridor, m, and weights of the cost of a step in a task.
 
-    What it charges for reversals, grounding and extrapolation is left out.
+    Of the rudder and of roll per rad^2, of the rudder rate per rad^2 in the time to
+    travel one ship length, of rudder travel per rad in a control interval. What the
+    task charges for reversals, grounding and extrapolation is left out.
     """
     travel_weight = getattr(task.settings, "rudder_travel_weight", 0.0)
-    return PathCosts(
-        corridor=task.corridor * model.particulars["length"],
-        rudder=task.rudder_weight / HEADING_SCALE**2,
-        rudder_rate=task.rudder_rate_weight / HEADING_SCALE**2,
-        rudder_travel=travel_weight / HEADING_SCALE,
-        roll=task.roll_weight / float(np.radians(task.roll_scale_deg)) ** 2,
-    )
+    return {
+        "corridor": task.corridor * model.particulars["length"],
+        "rudder": task.rudder_weight / HEADING_SCALE**2,
+        "rudder_rate": task.rudder_rate_weight / HEADING_SCALE**2,
+        "rudder_travel": travel_weight / HEADING_SCALE,
+        "roll": task.roll_weight / float(np.radians(task.roll_scale_deg)) ** 2,
+    }
 
 
 @lru_cache(maxsize=1)
@@ -453,19 +437,19 @@ def turned(ahead: Number, aside: Number, angle: Number) -> tuple[Number, Number]
 
 def add_step_cost(cost: Floats, guide: MPC, models: DesignModels) -> None:
     """Add the cost of the last step to that of each ship so far."""
-    weights = guide.costs
+    weights = guide.design
     particulars = guide.ship.particulars
     full_way = particulars["speed"] * models.dt
-    off_track = models.cross_track / weights.corridor
+    off_track = models.cross_track / weights["corridor"]
     share_of_way = models.progress / full_way
     rudder_rate = models.moved * particulars["length"] / full_way
 
     cost += off_track**2 - np.clip(share_of_way, -1.0, 1.0)
-    cost += weights.rudder * models.read("delta") ** 2
-    cost += weights.rudder_travel / COARSE * models.moved
-    cost += weights.rudder_rate * rudder_rate**2
-    if weights.roll > 0.0:
-        cost += weights.roll * models.read("phi") ** 2
+    cost += weights["rudder"] * models.read("delta") ** 2
+    cost += weights["rudder_travel"] / COARSE * models.moved
+    cost += weights["rudder_rate"] * rudder_rate**2
+    if weights["roll"] > 0.0:
+        cost += weights["roll"] * models.read("phi") ** 2
 
 
 @lru_cache(maxsize=8)

@@ -12,7 +12,12 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from agents.controllers.controller import Controller
-from agents.controllers.helm import HelmSettings, known
+from agents.controllers.helm import (
+    HelmSettings,
+    known,
+    logged_noise,
+    noise_setting,
+)
 from agents.controllers.linear_loop import (
     checked_interval,
     rate_weight,
@@ -51,11 +56,7 @@ class PIDSettings(HelmSettings):
         search=Step(1.0),
     )
 
-    noise: float = setting(
-        "of heading and yaw rate, in multiples of a sea trial's sensors (`SEA_TRIAL`)",
-        1.0,
-        at_least=0.0,
-    )
+    noise: float | None = noise_setting()
     rudder_time: float | None = setting(
         "time constant of a low-pass on the order, in times to travel one ship length;"
         " by default that with which noise moves the rudder by 10 deg a minute",
@@ -83,7 +84,8 @@ class PIDSettings(HelmSettings):
             slow = self.integral_pole(model)
             largest = largest_frequency(response, lag, damping, slow)
             frequency = min(frequency_share * optimal.frequency, largest)
-        return replace(self, frequency=frequency, damping=damping)
+        noise = logged_noise(model) if self.noise is None else self.noise
+        return replace(self, frequency=frequency, damping=damping, noise=noise)
 
     def integral_pole(self, model: ShipModel) -> float:
         """Pole of the integral action, 1/s."""
@@ -129,7 +131,7 @@ class PID(Controller):
         """
         interval = checked_interval(model, dt)
         ship = sample_ship(model, interval)
-        own = PIDSettings(**settings).completed(model, interval)
+        own: Any = PIDSettings(**settings).completed(model, interval)
         lag = lag_of(model, interval)
         gains = place_poles(
             nomoto(model),
@@ -171,11 +173,15 @@ def quiet_update(gains: Mapping[str, float], noise: float, dt: float) -> float:
     """
     by_rate = gains["derivative"] * SEA_TRIAL["yaw_rate"]
     by_heading = gains["proportional"] * SEA_TRIAL["heading"]
-    deviation = noise * float(np.hypot(by_rate, by_heading))
-    allowed = np.radians(10.0) / 60.0 * dt
+    of_sensors = float(np.hypot(by_rate, by_heading))
+    deviation = noise * of_sensors
+    allowed_rate = np.radians(10.0) / 60.0
+    allowed = allowed_rate * dt
     lead = gains["derivative"] / gains["proportional"]
-    least = dt / (dt + 0.2 * lead)
-    share = allowed / max(0.8 * deviation, 1e-12)
+    longest = 0.2 * lead
+    least = dt / (dt + longest)
+    moved = max(0.8 * deviation, 1e-12)
+    share = allowed / moved
     return float(np.clip(share, least, 1.0))
 
 

@@ -21,7 +21,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from agents.controllers.controller import ANY_NUMBER, Bounds, Controller
+from agents.controllers.controller import POSITIVE, Bounds, Controller
 from agents.controllers.guided import (
     COURSE_ERROR,
     TURNS,
@@ -219,8 +219,6 @@ def curvature_weight(place: str, default: float) -> Any:
     return setting(
         f"weight of the path's curvature {place}; at the end of the reach it is 0",
         default,
-        at_least=-10.0,
-        at_most=10.0,
         search=Step(0.15, is_factor=False),
     )
 
@@ -238,8 +236,7 @@ class PreviewSettings(Settings):
         "how far ahead the path's curvature counts, ship lengths; by default five times"
         " `own_lead`",
         None,
-        at_least=1e-4,
-        at_most=1e4,
+        above=0.0,
         search=Step(0.4),
     )
     weight_0: float = curvature_weight("beside the ship", 1.0)
@@ -251,8 +248,6 @@ class PreviewSettings(Settings):
         "power of speed over ground over service speed in the reach: 1 for a reach in"
         " time",
         0.0,
-        at_least=-2.0,
-        at_most=4.0,
         search=Step(0.5, is_factor=False),
     )
     crab_share: float = setting(
@@ -282,36 +277,27 @@ class PreviewSettings(Settings):
     sway_gain: float = setting(
         "change of course, rad, per sway over service speed",
         0.0,
-        at_least=-100.0,
-        at_most=100.0,
         search=Step(0.5, is_factor=False),
     )
     dead_band_deg: float = setting(
         "heading error that is left alone, degrees",
         0.0,
         at_least=0.0,
-        at_most=180.0,
         search=Step(1.2, start=0.05),
     )
     speed_power: float = setting(
         "power of service speed over speed in the gain on the heading error",
         0.0,
-        at_least=-2.0,
-        at_most=4.0,
         search=Step(0.5, is_factor=False),
     )
     roll_gain: float = setting(
         "change of course per heel, where the task shows it",
         0.0,
-        at_least=-100.0,
-        at_most=100.0,
         search=Step(0.4, is_factor=False),
     )
     roll_time: float = setting(
         "change of course per rate of heel, in times to travel one ship length",
         0.0,
-        at_least=-100.0,
-        at_most=100.0,
         search=Step(0.4, is_factor=False),
     )
 
@@ -394,18 +380,9 @@ class PreviewLQ(Guided):
     )
     bounds: ClassVar[Mapping[str, Bounds]] = {
         **Guided.bounds,
-        "reach": Bounds(1e-6, ANY_NUMBER.largest),
-        "reach_power": Bounds(-2.0, 4.0),
-        "crab_share": Bounds(0.0, 2.0),
-        "course_share": Bounds(0.0, 1.0),
-        "current_update": Bounds(0.0, 1.0),
-        "yaw_update": Bounds(0.0, 1.0),
-        "dead_band": Bounds(0.0, np.pi),
-        "speed_power": Bounds(-2.0, 4.0),
-        "path_radius": Bounds(1e-6, ANY_NUMBER.largest),
-        "sight": Bounds(1e-6, ANY_NUMBER.largest),
-        "service_speed": Bounds(1e-6, ANY_NUMBER.largest),
-        "interval": Bounds(1e-3, 1e4),
+        **dict.fromkeys(
+            ("reach", "path_radius", "service_speed", "interval"), POSITIVE
+        ),
     }
 
     @classmethod
@@ -456,8 +433,7 @@ class PreviewLQ(Guided):
     @cached_property
     def parameters(self) -> PreviewGains:
         """Parameters of its law."""
-        own = {name: self.gains[name] for name in PreviewGains._fields}
-        return PreviewGains(**own)
+        return PreviewGains(*[self.gains[name] for name in PreviewGains._fields])
 
 
 def led_lq(autopilot: Controller | None, model: ShipModel, task: Task) -> LQ:

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from agents.controllers.controller import ANY_NUMBER, Bounds, Controller
+from agents.controllers.controller import POSITIVE, Bounds, Controller
 from agents.controllers.guided import (
     COURSE_ERROR,
     TURNS,
@@ -29,7 +29,6 @@ from agents.controllers.law import (
     Nothing,
     Number,
     PathSignals,
-    Turns,
     wrapped,
 )
 from agents.controllers.linear_loop import small_motions
@@ -57,14 +56,9 @@ def wheel_over_law(
     """Course that comes to the path and turns with it, against a current's drift."""
     leeway = np.arctan2(seen.sway, seen.surge)  # through the water
     crab = wrapped(seen.drift - leeway)
-    course = course_over_ground(seen.cross_track, seen.turns, p)
+    ahead = bend(p.turn_reach, seen.turns, p.path_radius)
+    course = ahead - np.arctan2(seen.cross_track, p.lookahead)
     return course - p.crab_share * crab, memory
-
-
-def course_over_ground(cross_track: Number, turns: Turns, p: WheelOverGains) -> Number:
-    """Course over ground that comes to the path and turns with it, rad."""
-    ahead = bend(p.turn_reach, turns, p.path_radius)
-    return ahead - np.arctan2(cross_track, p.lookahead)
 
 
 @dataclass(frozen=True)
@@ -120,9 +114,7 @@ class WheelOver(Guided):
     )
     bounds: ClassVar[Mapping[str, Bounds]] = {
         **Guided.bounds,
-        "turn_reach": Bounds(0.0, ANY_NUMBER.largest),
-        "crab_share": Bounds(0.0, 2.0),
-        "path_radius": Bounds(1e-6, ANY_NUMBER.largest),
+        "path_radius": POSITIVE,
     }
 
     @classmethod
@@ -163,13 +155,7 @@ class WheelOver(Guided):
     @cached_property
     def parameters(self) -> WheelOverGains:
         """Parameters of its law."""
-        gains = self.gains
-        return WheelOverGains(
-            lookahead=gains["lookahead"],
-            turn_reach=gains["turn_reach"],
-            path_radius=gains["path_radius"],
-            crab_share=gains["crab_share"],
-        )
+        return WheelOverGains(*[self.gains[name] for name in WheelOverGains._fields])
 
 
 def own_lead(model: ShipModel, autopilot: Controller | None) -> float:

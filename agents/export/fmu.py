@@ -7,7 +7,6 @@ import subprocess
 import uuid
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from agents.export.c_syntax import comment
@@ -25,17 +24,6 @@ UNITS = {
     "rad/s2": {"rad": 1, "s": -2},
     "1/s": {"s": -1},
 }
-
-
-class FmuVariable(NamedTuple):
-    """A variable with its value reference and attributes of FMI."""
-
-    name: str
-    reference: int
-    causality: str
-    start: float
-    unit: str
-    description: str
 
 
 def write_fmu(source: Source, path: str | Path) -> None:
@@ -74,24 +62,6 @@ def check_fmu_name(path: Path) -> None:
         )
 
 
-def fmu_variables(source: Source) -> list[FmuVariable]:
-    """Inputs and outputs of an exported ship or autopilot, in order."""
-    found: list[FmuVariable] = []
-    for causality, variables in (("input", source.inputs), ("output", source.outputs)):
-        for name, about in variables.items():
-            found.append(
-                FmuVariable(
-                    name=name,
-                    reference=len(found) + 1,
-                    causality=causality,
-                    start=about.start,
-                    unit=about.unit,
-                    description=about.meaning,
-                )
-            )
-    return found
-
-
 def _texts(source: Source) -> dict[str, str]:
     """Texts of an FMU by their names in its archive."""
     name = source.name
@@ -102,7 +72,7 @@ def _texts(source: Source) -> dict[str, str]:
         "token": str(token),
         "title": comment(source.title),
         "wrapper": wrapper,
-        "variables": fmu_variables(source),
+        "variables": [*source.inputs.items(), *source.outputs.items()],
         "units": UNITS,
     }
     texts = {}

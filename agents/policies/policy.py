@@ -14,7 +14,7 @@ arXiv:1812.06298; Johannink et al. 2019, Residual reinforcement learning for rob
 control, ICRA.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -23,21 +23,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import FORMAT, Action, Controller
-from agents.controllers.interface import check_names, check_scales
+from agents.controllers.interface import Fitting
 from agents.controllers.memory import (
     checked_memory,
     checked_observation,
     checked_starts,
 )
 from agents.policies.network import Network, Numbers
-from agents.policies.policy_extraction import sb3_fields, task_showing
+from agents.policies.policy_extraction import sb3_fields
 from agents.policies.weights_file import Tensors, write_policy
-from shipgym import InputError, ShipModel
+from shipgym import InputError
 from shipgym.checks import check_choice, check_number, check_whole
 from shipgym.envs.episode import as_json
 from shipgym.envs.pace import NO_LIMIT, toward
-from shipgym.tasks.definition import read_definition
-from shipgym.tasks.task import ACTIONS, RUDDER_ORDERS, Task
+from shipgym.tasks.task import ACTIONS, RUDDER_ORDERS
 
 ORDERS = np.array(RUDDER_ORDERS, dtype=np.float32)
 #: Number of the network's outputs by the kind of action.
@@ -69,7 +68,7 @@ PLAIN = (
 
 
 @dataclass(frozen=True, eq=False)
-class LearnedPolicy:
+class LearnedPolicy(Fitting):
     """A learned autopilot with `predict` as in `Controller`; steers without torch.
 
     Raises InputError naming the field whose value does not fit.
@@ -187,9 +186,6 @@ class LearnedPolicy:
             or self.rate_limit < NO_LIMIT
         )
 
-    def reset(self) -> None:
-        """State with which an episode begins: None, for any number of ships."""
-
     def predict(
         self,
         observation: ArrayLike,
@@ -296,48 +292,13 @@ class LearnedPolicy:
             in_force=np.where(begins, output, state.in_force),
         )
 
-    def check_fits(
-        self, names: Sequence[str], scales: Sequence[float], where: str = "observations"
-    ) -> None:
-        """Refuse observations that do not begin as those it learned with.
-
-        Arguments and errors as in `Controller.check_fits`.
-        """
-        learned = self.observation_names
-        named = f"{where}: not those that the agent learned with in {self.env_id}"
-        check_names(names[: len(learned)], learned, named)
-        check_scales(
-            names,
-            scales,
-            self.observation_scales,
-            where,
+    @property
+    def remedy(self) -> str:
+        """What to do where it does not fit."""
+        return (
             f"policy '{self.name}' learned on another ship or task (model"
-            f" '{self.model_name}', {self.env_id}); train one in this environment",
+            f" '{self.model_name}', {self.env_id}); train one in this environment"
         )
-
-    def check_fits_model(self, model: ShipModel) -> None:
-        """Refuse a ship with other observation scales in its environment.
-
-        One that learned a task of a user's own is checked where it meets the task.
-        """
-        if "task" in self.env_options:
-            return
-        definition = read_definition(task_showing(self.observation_names))
-        options: dict[str, Any] = {
-            "action": self.action,
-            "roll": "roll" in self.observation_names,
-        }
-        # further options that decide in which scales is observed
-        for name in ("corridor", "ground"):
-            if name in self.env_options:
-                options[name] = self.env_options[name]
-        task = Task.of(definition, **options)
-        task.check_fits(model)
-
-        shown = task.observed(model)
-        names = [quantity.name for quantity in shown]
-        scales = [quantity.scale for quantity in shown]
-        self.check_fits(names, scales, f"model '{model.name}'")
 
     def save(self, path: str | Path) -> None:
         """Write NAME.json and NAME.safetensors (fields in docs/policies.md)."""

@@ -6,7 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from agents.controllers.controller import FORMAT
-from agents.controllers.controller_file import read_controller, read_model, read_scales
+from agents.controllers.controller_file import (
+    read_controller,
+    read_model,
+    read_names,
+    read_scales,
+)
 from agents.policies.network import Layer, Network
 from agents.policies.policy import PLAIN, LearnedPolicy
 from agents.policies.weights_file import (
@@ -21,7 +26,6 @@ from shipgym.checks import (
     check_table,
     check_text,
     placed,
-    quoted,
     unexpected,
 )
 
@@ -52,7 +56,7 @@ def _learned(content: Mapping[str, Any], tensors: Tensors) -> LearnedPolicy:
     """Learned policy of a file's fields; its weights are taken out of `tensors`."""
     environment = check_table(content["environment"], "environment", ("id", "options"))
     options = check_table(environment.get("options"), "environment.options")
-    names = _names(content["observation_names"])
+    names = read_names(content["observation_names"])
     base = None
     if content["base"] is not None:
         base = read_controller(check_table(content["base"], "base"), "base")
@@ -95,15 +99,3 @@ def _network(value: Any, tensors: Tensors) -> Network:
         activation=str(table.get("activation")),
         output=str(table.get("output")),
     )
-
-
-def _names(value: Any) -> tuple[str, ...]:
-    """Read the names of observations."""
-    where = "observation_names"
-    if not isinstance(value, list):
-        raise unexpected(where, "a list of names", value)
-    for i, name in enumerate(value):
-        check_text(name, f"{where}[{i}]")
-    if len(set(value)) < len(value):
-        raise InputError(f"{where}: expected each name once, got {quoted(value)}")
-    return tuple(value)

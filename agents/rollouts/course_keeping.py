@@ -126,12 +126,9 @@ def _seeds(seeds: ArrayLike, n_models: int) -> Integers:
     numbers = np.atleast_1d(np.asarray(seeds))
     if numbers.dtype.kind not in "iu" or numbers.ndim != 1 or numbers.size == 0:
         raise unexpected("seeds", "integers in a row", seeds)
-    if n_models > 1 and len(numbers) == 1:
+    is_one = len(numbers) == 1
+    if is_one:
         return np.repeat(numbers, n_models)
-    if n_models > 1 and len(numbers) != n_models:
-        raise InputError(
-            f"seeds: expected one for each of {n_models} models, got {len(numbers)}"
-        )
     return numbers
 
 

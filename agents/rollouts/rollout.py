@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.interface import Policy
+from agents.controllers.interface import Policy, read_commands
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats
 from shipgym.envs.engine import Engine, episode_keys
@@ -173,7 +173,7 @@ class _Helmsman:
                 raise
             fault = told(error)
         if not fault:
-            given, fault = _numbers(actions, values.shape)
+            given, fault = read_commands(actions, values.shape)
             missing = sailing & ~np.isfinite(given).all(axis=1)
             values = np.where((sailing & ~missing)[:, None], given, values)
             if missing.any() and not fault:
@@ -191,16 +191,3 @@ class _Helmsman:
         if fault and not self.failure:
             self.failure = f"{where}: {fault}"
         return values, missing
-
-
-def _numbers(actions: Any, shape: tuple[int, int]) -> tuple[NDArray[np.float32], str]:
-    """What a policy returned as numbers, else NaN, and what is wrong with it."""
-    nothing = np.full(shape, np.nan, dtype=np.float32)
-    try:
-        with np.errstate(over="ignore"):
-            values = np.array(actions, dtype=np.float32)
-    except (TypeError, ValueError):
-        return nothing, f"expected an array of numbers, got {type(actions).__name__}"
-    if values.shape != shape:
-        return nothing, f"expected actions of shape {shape}, got {values.shape}"
-    return values, ""

@@ -82,6 +82,11 @@ def sea_sentences(provenance: Mapping[str, Any]) -> list[str]:
             f"wind of {min(speeds):.2g} to {max(speeds):.2g} m/s on average: its forces"
             " are removed"
         )
+    if "wave_period" in provenance:
+        sentences.append(
+            f"waves with a period of {provenance['wave_period']:.1f} s as they are met:"
+            " PID and LQ keep them from the rudder"
+        )
     return sentences
 
 

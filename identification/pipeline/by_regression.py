@@ -40,6 +40,7 @@ from identification.pipeline.options import (
 )
 from identification.pipeline.pose import pose
 from identification.pipeline.result import IdentificationResult
+from identification.samples.logged_sensors import noise_and_waves
 from identification.samples.prediction import is_yaw_alone, predict
 from identification.samples.problem import Problem
 from identification.samples.samples import Samples
@@ -221,7 +222,8 @@ def evaluated(
     trials = tuple(trial for trial in problem.trials if trial.use != "skip")
     predictions = {trial.name: predict(model, trial) for trial in trials}
     lost = [name for name, predicted in predictions.items() if predicted is None]
-    complete = dict(provenance)
+    seen = noise_and_waves(problem.used, model.travel_time)
+    complete = {**provenance, **seen}
     measured = {
         trial.name: measured_indices(model, trial, predictions[trial.name])
         for trial in problem.used

@@ -24,7 +24,7 @@ from agents import (
 from agents.cli import app
 from agents.controllers.guided import TURNS, bend
 from agents.controllers.law import Turns
-from agents.export.autopilot_c99 import autopilot_source
+from agents.export.autopilot import autopilot_source
 from agents.export.ship_c99 import ShipInput, advance, ship_source
 from shipgym.engine.motion import Motion
 from shipgym.engine.specialise import Specialisation

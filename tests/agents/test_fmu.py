@@ -10,7 +10,7 @@ from fmpy import validation
 
 from agents import LQ, WheelOver
 from agents.export import fmu
-from agents.export.autopilot_c99 import autopilot_source
+from agents.export.autopilot import autopilot_source
 from agents.export.fmu import write_fmu
 from agents.export.ship_c99 import ship_source
 from shipgym.errors import InputError

@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 from agents import LQ, LQG, load_agent, sail
-from agents.controllers.kalman import kalman_gain, rudder_response
+from agents.controllers.kalman import course_filter, kalman_gain
 from agents.controllers.linear_loop import sample_ship
 from shipgym.errors import InputError
+from shipgym.instruments.noise import SEA_TRIAL
 from shipgym.models.linear import straight_running
 from shipgym.tasks import control_interval, course_keeping_task
 from tests.agents.mariners import MARINER, changed
@@ -16,13 +17,10 @@ UNSTABLE = changed(N_v=1.7, N_uv=1.7)
 
 
 def test_the_kalman_gain_is_that_of_python_control_and_of_the_recursion():
-    transition, _ = rudder_response(MARINER, straight_running(MARINER), 1.0)
-    output, process, noise = (
-        np.eye(3)[1:],
-        np.diag([1e-3, 1e-8, 1e-7]),
-        np.diag([1e-7, 3e-6]),
-    )
-    gain, deviation = kalman_gain(transition, process, output, noise)
+    states = course_filter(MARINER, straight_running(MARINER), 1.0, disturbance=0.04)
+    transition, output, process = states.transition, states.output, states.process
+    noise = np.diag([SEA_TRIAL["yaw_rate"], SEA_TRIAL["heading"]]) ** 2
+    gain, deviation = kalman_gain(states, noise=1.0)
     predictor, _, _ = control.dlqe(transition, np.eye(3), output, process, noise)
     assert transition @ gain == pytest.approx(np.asarray(predictor), rel=1e-9)
     covariance = np.eye(3)

@@ -112,7 +112,9 @@ class Broken:
 
 
 @pytest.mark.parametrize("kind", DESIGNS)
-@pytest.mark.parametrize("name", ["mariner", "lagging"])
+@pytest.mark.parametrize(
+    "name", ["mariner", "lagging", "kvlcc2", "mariner-tls-svm", "kvlcc2-rm-svm"]
+)
 def test_ships_settle_below_a_margin_and_swing_above_it(name, kind):
     """At nine tenths and eleven tenths of each margin, gear and its limits included."""
     model = SHIPS[name]
