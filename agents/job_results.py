@@ -6,51 +6,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import shipgym
-from shipgym.errors import InputError
 from shipgym.files import make_folder, read_json, write_json
 
 JobFunction = Callable[[dict[str, Any]], Any]
 
 
-def job_to_json(job: Any, where: str) -> str:
-    """A job as JSON text; InputError for anything but a dict of what JSON holds."""
-    try:
-        text = json.dumps(job, allow_nan=False)
-    except (TypeError, ValueError) as error:
-        text = str(error)
-    if not text.startswith("{"):
-        raise InputError(
-            f"{where}: expected a dict of finite numbers, strings, lists and dicts, got"
-            f" {job!r} ({text})"
-        )
-    return text
-
-
 def result_to_json(result: Any) -> str:
-    """A result as JSON text; TypeError if it is neither JSON nor an array of it."""
-    return json.dumps(result, default=_encoded)
-
-
-def _encoded(item: Any) -> Any:
-    if isinstance(item, np.generic):
-        return item.item()
-    if isinstance(item, np.ndarray) and item.dtype.kind in "biufU":
-        return {"__array__": item.tolist(), "dtype": item.dtype.str}
-    raise TypeError(f"result: expected what JSON holds, got {type(item).__name__}")
-
-
-def result_from_json(text: str) -> Any:
-    """The result that `result_to_json` was given, the same bit for bit."""
-
-    def decode(table: dict[str, Any]) -> Any:
-        if table.keys() != {"__array__", "dtype"}:
-            return table
-        return np.array(table["__array__"], table["dtype"])
-
-    return json.loads(text, object_hook=decode)
+    """A result as JSON text, arrays as lists."""
+    return json.dumps(result, default=lambda item: item.tolist())
 
 
 class KeptResults:
@@ -71,7 +35,7 @@ class KeptResults:
             if kept["job"] != job:
                 return None
             result: str = kept["result"]
-            result_from_json(result)
+            json.loads(result)
         except Exception:  # there are many ways to be broken
             return None
         return result

@@ -21,13 +21,7 @@ from joblib.externals.loky import get_reusable_executor
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from agents.controllers.registry import registered_modules
-from agents.job_results import (
-    JobFunction,
-    KeptResults,
-    job_to_json,
-    result_from_json,
-    result_to_json,
-)
+from agents.job_results import JobFunction, KeptResults, result_to_json
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
 from shipgym.extras import library
@@ -105,7 +99,7 @@ def run_jobs(
     ----------
     function : callable
         Function at the top level of a module. It takes a job and returns what JSON
-        holds, with arrays of numbers or texts. Tuples become lists.
+        holds. Tuples and arrays become lists.
     jobs : sequence of dict
         What JSON holds. Equal jobs run once.
     where : JobEngine
@@ -113,12 +107,7 @@ def run_jobs(
     progress : callable, optional
         Called with the number of jobs done and their total.
     """
-    if "<" in getattr(function, "__qualname__", "<unnamed>"):
-        raise InputError(
-            "function: expected a function at the top level of a module, so that"
-            f" workers find it, got {function!r}"
-        )
-    texts = [job_to_json(job, f"jobs[{number}]") for number, job in enumerate(jobs)]
+    texts = [json.dumps(job, allow_nan=False) for job in jobs]
     kept = None if where.keep is None else KeptResults(where.keep, function)
     results = {}
     for text in texts:
@@ -138,7 +127,7 @@ def run_jobs(
         if kept is not None:
             kept.save(text, result)
         report()
-    return [result_from_json(results[text]) for text in texts]
+    return [json.loads(results[text]) for text in texts]
 
 
 def _finished(function: JobFunction, texts: list[str], where: JobEngine) -> Finished:

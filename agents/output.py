@@ -1,9 +1,10 @@
 """Folders of results: one process at a time, whole or not at all, no other files."""
 
 import os
-import socket
+import platform
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
+from importlib.metadata import version
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -36,6 +37,33 @@ def check_folder(folder: Path, names: Collection[str]) -> None:
                     " new one"
                 )
     check_writable(folder)
+
+
+def check_results(folder: Path, own: Collection[str], resume: bool) -> None:
+    """Refuse a folder that cannot take results which a later call may go on with.
+
+    `own`: names of files, of which one shows that it holds some; they are for `resume`.
+    Raises InputError saying what to do.
+    """
+    check_writable(folder)
+    names = present(folder) if folder.exists() else []
+    has_results = any(name in own for name in names)
+    if names and not has_results:
+        raise InputError(
+            f"{folder}: expected results of this command or nothing, got '{names[0]}';"
+            " choose another folder"
+        )
+    if has_results and not resume:
+        raise InputError(
+            f"{folder}: already contains results; continue with --resume (resume=True),"
+            " or choose another folder"
+        )
+
+
+def versions(*packages: str) -> dict[str, str]:
+    """Return the versions of Python and of the packages that results depend on."""
+    found = {package: version(package) for package in ("shipgym", *packages)}
+    return {"python": platform.python_version(), **found}
 
 
 def check_writable(folder: Path) -> None:
@@ -86,8 +114,7 @@ def in_use(folder: Path) -> Iterator[None]:
 
     The folder and those above it are made, and removed again if they stay empty. The
     lock of a process that was killed is free; a disk that has no locks is used without.
-    Raises InputError if another process uses the folder, saying which, or if it cannot
-    be written.
+    Raises InputError if another process uses the folder, or if it cannot be written.
     """
     target = folder.absolute()
     missing = [path for path in (target, *target.parents) if not path.exists()]
@@ -118,25 +145,19 @@ def _writing(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder, which has the user's name for others."""
+    """Hold the lock of a folder."""
     path = folder / LOCK
-    user = "another process"
-    with suppress(OSError):
-        user = path.read_text(encoding="utf-8", errors="replace") or user
     lock = FileLock(path)
     try:
         lock.acquire(timeout=0)
     except Timeout:
         raise InputError(
-            f"{folder}: in use by {user}; wait until it has ended, or name another"
-            " folder"
+            f"{folder}: in use by another process; wait until it has ended, or name"
+            " another folder"
         ) from None
     except (NotImplementedError, OSError):
         pass  # a disk without locks
     try:
-        if lock.is_locked:
-            here = f"process {os.getpid()} on {socket.gethostname()}"
-            path.write_text(here, encoding="utf-8")
         yield
     finally:
         if lock.is_locked:

@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from encounter_rule import NUMBERS, EncounterRule
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
+from agents.controllers.learning_rules import LearningRule, RollDamping, Scenarios
 from agents.training.controller_search import SearchBudget, search
 from agents.training.controller_space import factor
 from agents.training.residual import ResidualVecEnv
@@ -29,80 +29,31 @@ from shipgym.envs.sb3 import ShipVecEnv
 
 JUDGED, SEARCHED = 1_000_000, 500_000  # first seeds
 EPISODES = 100
-DT = 1.0  # s, interval of rudder-roll damping
 
 
-class PD:
+class PD(LearningRule):
     """Feedback of heading error, yaw rate and the integral of the error."""
 
     numbers: Mapping[str, float] = {"error": 2.0, "rate": 2.0, "integral": 0.1}
 
-    def __init__(self, names: Any, numbers: Mapping[str, float]) -> None:
-        self.numbers = numbers
-
-    def predict(self, seen: Any, *_: Any, **__: Any) -> tuple[Any, None]:
-        """Rudder for each ship."""
+    def steer(self, rows: Floats, state: Any, starts: Any) -> tuple[Floats, Any]:
+        """No memory."""
         k = self.numbers
-        error = np.arctan2(seen[:, 0], seen[:, 1])
-        rudder = (
-            k["error"] * error - k["rate"] * seen[:, 2] + k["integral"] * seen[:, 7]
-        )
-        return np.clip(rudder, -1.0, 1.0)[:, None].astype(np.float32), None
-
-
-class RollDamping:
-    """PD on a smooth heading, and feedback of roll without its mean.
-
-    Roll is damped as far as it has grown: below three degrees it costs nothing
-    (automatic gain control: van Amerongen, van der Klugt & van Nauta Lemke 1990, Rudder
-    roll stabilization for ships, Automatica 26).
-    """
-
-    numbers: Mapping[str, float] = {
-        "error": 2.8,  # rudder by its limit for an error of 1 rad
-        "rate": 1.0,  # against a yaw rate of 1, in her length and speed
-        "roll": 0.4,
-        "roll_rate": 0.3,
-        "smooth": 1.0,  # s, of the heading
-        "slow": 20.0,  # s, of the mean of roll
-        "free": 0.5,  # deg, roll that is not damped
-        "width": 1.0,  # deg, until it is damped in full
-    }
-
-    def __init__(self, names: Any, numbers: Mapping[str, float]) -> None:
-        self.numbers = numbers
-
-    def predict(
-        self, seen: Any, state: Any = None, *_: Any, **__: Any
-    ) -> tuple[Any, Any]:
-        """Rudder for each ship; the state is what its filters have kept."""
-        k = self.numbers
-        error = np.arctan2(seen[:, 0], seen[:, 1])
-        roll = seen[:, 8]
-        now = np.stack([error, seen[:, 2], roll, np.zeros(len(seen))])
-        kept = now if state is None else state
-        times = np.array([k["smooth"], k["smooth"], k["slow"]])[:, None]
-        kept[:3] += DT / (DT + times) * (now[:3] - kept[:3])
-        kept[3] += DT / 20.0 * (roll**2 - kept[3])
-        level = 30.0 * np.sqrt(kept[3])  # deg
-        part = np.clip((level - k["free"]) / k["width"], 0.0, 1.0)
-        damping = k["roll"] * (roll - kept[2]) - k["roll_rate"] * seen[:, 9]
-        rudder = k["error"] * kept[0] - k["rate"] * kept[1] + part * damping
-        return np.clip(rudder, -1.0, 1.0)[:, None].astype(np.float32), kept
+        error = k["error"] * np.arctan2(rows[:, 0], rows[:, 1])
+        return error - k["rate"] * rows[:, 2] + k["integral"] * rows[:, 7], state
 
 
 class Task(NamedTuple):
-    """An environment, a rule for it, and the numbers from which a search begins."""
+    """An environment, and a rule for it, whose numbers a search begins from."""
 
     env: str
-    rule: Any
-    numbers: Mapping[str, float]
+    rule: type[LearningRule]
 
 
 TASKS = {
-    "rudder-roll": Task("shipgym/RudderRoll-v0", RollDamping, RollDamping.numbers),
-    "encounter": Task("shipgym/Encounter-v0", EncounterRule, NUMBERS),
-    "unknown-ship": Task("shipgym/UnknownShip-v0", PD, PD.numbers),
+    "rudder-roll": Task("shipgym/RudderRoll-v0", RollDamping),
+    "encounter": Task("shipgym/Encounter-v0", Scenarios),
+    "unknown-ship": Task("shipgym/UnknownShip-v0", PD),
 }
 
 
@@ -153,7 +104,7 @@ def ships_of(task: Task, n: int, seed: int, frames: int = 1, base: Any = None) -
 def rule_of(task: Task, ships: Any, numbers: Mapping[str, float] | None = None) -> Any:
     """The rule of a task with some numbers."""
     (names,) = ships.get_attr("observation_names", 0)
-    return task.rule(names, numbers or task.numbers)
+    return task.rule(names, numbers)
 
 
 def judged(policy: Any, ships: Any) -> Judged:
@@ -197,8 +148,9 @@ def searched(task: Task, seconds: float) -> Any:
             found.append(judged(rule_of(task, ships, numbers), ships).costs.mean())
         return np.array(found)
 
-    space = [factor(name, start, step=0.5) for name, start in task.numbers.items()]
+    space = [factor(name, start, step=0.5) for name, start in task.rule.numbers.items()]
     found = search(costs, space, SearchBudget(seconds=seconds))
+    print(found.mean)
     return rule_of(task, ships, found.mean)
 
 

@@ -25,7 +25,7 @@ from agents.policies.policy import LearnedPolicy
 from agents.rollouts.rollout import episode_costs
 from agents.training.plan import TrainingPlan, make_plan
 from agents.training.training import train
-from agents.training.yardsticks import ZeroAction
+from agents.training.yardsticks import RandomActions
 from shipgym.envs.registration import register_file
 from shipgym.examples import FOLDER
 
@@ -77,7 +77,7 @@ def row(name: str, seed: int) -> None:
     env_id = f"own/{name.capitalize()}-v0"
     register_file(env_id, TASKS[name])
     plan = make_plan("ppo", env_id, settings={"total_steps": 65_536}, seed=seed)
-    costs = [judged(ZeroAction(plan.task.task.n_commands), plan)]
+    costs = [judged(RandomActions(plan.task.task.n_commands, 0.0), plan)]
     began = time.process_time()
     costs += by_shipgym(plan)
     learned = time.process_time()

@@ -37,10 +37,10 @@ def main() -> None:
     path = suite_file(suite.source, "tuned")
     known = load_tuned(suite.source) if path.exists() else {}
     for task in suite.select(given.tasks):
-        kinds = (
-            given.controllers.split(",") if task.design.task.follows_path else ["lq"]
-        )
-        for kind in kinds if task.part == "steering" else ():
+        kinds = given.controllers.split(",")
+        if not task.design.task.follows_path:
+            kinds = [task.rule.removeprefix("tuned-")]
+        for kind in kinds if task.rule.startswith("tuned-") else ():
             of_task: dict[str, Any] = known.setdefault(task.name, {})
             runs = of_task.setdefault(kind, [])
             for seed in range(len(runs), given.runs):

@@ -66,13 +66,14 @@ class Cell:
         tables = []
         for on, figures in self.figures.items():
             n_runs, n_episodes = figures["cost"].shape
-            seeds = judging_seeds(on, n_episodes, options.seed)
+            seeds = judging_seeds(on, options.episodes, options.seed)
             runs = np.arange(n_runs)
+            run_of_each = np.repeat(runs, n_episodes)
             columns: dict[str, Any] = {
                 "controller": controller,
                 "task": task,
                 "set": on,
-                "run": np.repeat(runs, n_episodes),
+                "run": run_of_each,
                 "seed": np.tile(seeds, n_runs),
             }
             for name, values in figures.items():
@@ -127,6 +128,18 @@ def job_of(entry: Entry, task: BenchmarkTask, options: Options) -> dict[str, Any
         "files": {**entry.fingerprint(task), **task_files},
         "options": options._asdict(),
     }
+
+
+def read_cell(result: dict[str, Any]) -> Cell:
+    """Return the cell of a job's result, whose arrays are lists."""
+    fields = dict(result)
+    sets = fields.pop("figures")
+    figures: dict[str, Figures] = {}
+    for on, found in sets.items():
+        figures[on] = {}
+        for name, values in found.items():
+            figures[on][name] = np.array(values)
+    return Cell(figures=figures, **fields)
 
 
 def run_job(job: dict[str, Any]) -> dict[str, Any]:

@@ -5,7 +5,9 @@ A controller is named, on the command line and in Python, as
     pid                   a classical controller, designed for the model of each task
     tuned-pid             the same with the settings of direct searches for the task
     ppo                   the shipped agent of the environment (agents/pretrained)
-    rule                  the rule in the file of the task (shipgym.tasks.contract)
+    rule                  the rule in the file of the task (shipgym.tasks.contract),
+                          or the one that its suite names
+    roll-damping, ...     a rule of agents.controllers.learning_rules
     runs/agent.json       a file of an agent or controller
     runs/{task}-*.json    one file for each task; several that match are runs
     my_module:factory     a function that returns a controller for a `BenchmarkTask`,
@@ -24,7 +26,6 @@ import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
 from math import inf
 from pathlib import Path
 from types import ModuleType
@@ -36,6 +37,7 @@ from agents.agent_file import PRETRAINED, load_agent
 from agents.controllers.controller import Controller
 from agents.controllers.designs import design, tuned, tuned_runs
 from agents.controllers.interface import Policy, check_fits, model_hash
+from agents.controllers.learning_rules import LEARNING_RULES
 from agents.controllers.registry import (
     CLASSICAL,
     controller_class,
@@ -43,16 +45,17 @@ from agents.controllers.registry import (
     register_controller,
 )
 from agents.controllers.task_rule import TaskRule
+from agents.suites.environments import import_named
 from agents.suites.suite import BenchmarkTask, suite_file
 from shipgym import load_model
 from shipgym.checks import did_you_mean, quoted
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.files import LARGEST_TENSORS, read_bytes
-from shipgym.python_files import load_file, working_folder
+from shipgym.python_files import load_file
 
 SHIPPED = "ppo"  # agents of agents/pretrained, one for each environment
-RULE = "rule"  # of the task's own file
+RULE = "rule"  # of the task
 TUNED = "tuned-"
 
 
@@ -109,11 +112,12 @@ class Entry:
         where = f"'{self.name}' on task '{task.name}'"
         given = task.design_task
         before, began = Engine.ship_steps, time.process_time()
-        policies = _policies(self.source, given, runs)
+        source = source_for(self.source, given)
+        policies = _policies(source, given, runs)
         seconds = (time.process_time() - began) / len(policies)
         steps = (Engine.ship_steps - before) / len(policies)
-        if self.is_text and self.source.startswith(TUNED):
-            kind = _kind(self.source.removeprefix(TUNED), given)
+        if self.is_text and source.startswith(TUNED):
+            kind = _kind(source.removeprefix(TUNED), given)
             found = tuned_runs(kind, given, given.suite)
             steps = float(np.mean([run.get("ship_steps", 0) for run in found]))
             seconds = float(np.mean([run.get("seconds", 0.0) for run in found]))
@@ -136,13 +140,14 @@ class Entry:
         """Return the SHA-256 of each file that it is made from for a task, by path."""
         if not self.is_text:
             return {}
-        return {str(path): file_hash(path) for path in source_files(self.source, task)}
+        files = source_files(source_for(self.source, task), task)
+        return {str(path): file_hash(path) for path in files}
 
 
 def known_names() -> tuple[str, ...]:
     """Names that stand for a controller, other than files and functions."""
     tuned_names = [TUNED + kind for kind in CLASSICAL]
-    return (*controller_kinds(), SHIPPED, RULE, *tuned_names)
+    return (*controller_kinds(), SHIPPED, RULE, *LEARNING_RULES, *tuned_names)
 
 
 def names_code(text: str) -> bool:
@@ -199,8 +204,8 @@ def _named(given: Any) -> tuple[str, Any]:
     if isinstance(given, Entry):
         return given.name, given.source
     if isinstance(given, str):
-        name, equals, source = (part.strip() for part in given.partition("="))
-        return (name, source) if equals else (_short_name(name), name)
+        name, _, source = (part.strip() for part in given.partition("="))
+        return name, source or name
     # an object is known by its name, a function by its own, others by their class
     kind = type(given).__name__
     own: Any = getattr(given, "name", None)
@@ -209,28 +214,9 @@ def _named(given: Any) -> tuple[str, Any]:
     return str(own), given
 
 
-def _short_name(text: str) -> str:
-    """Name of an entry that was given without one."""
-    if names_code(text):
-        _, _, function = text.rpartition(":")
-        return function
-    if not text.endswith(".json"):
-        return text
-    stem = Path(text).stem
-    for wildcard in ("{task}", "*"):
-        stem = stem.replace(wildcard, "")
-    return stem.strip("-_.") or "agent"
-
-
 def _check_text(text: str) -> None:
     """Refuse a text that names no controller, function or file."""
     known = known_names()
-    if text.endswith(".zip"):
-        raise InputError(
-            f"controllers: '{text}': expected a file that runs no code, got one of"
-            " stable-baselines3; load it there, and write"
-            " LearnedPolicy.from_sb3(agent).save('agent.json')"
-        )
     if text in known or "{task}" in text:
         return
     if names_code(text):
@@ -261,6 +247,12 @@ def _check_object(source: Any, name: str) -> None:
         )
 
 
+def source_for(source: Any, task: BenchmarkTask) -> Any:
+    """Return a source; of the rule of a task whose file has none, the suite's."""
+    is_suites = source == RULE and task.task.definition.rule is None
+    return task.rule if is_suites else source
+
+
 def _policies(source: Any, task: BenchmarkTask, runs: int) -> list[Policy]:
     """Make the controllers of a source for a design task."""
     if not isinstance(source, str):
@@ -269,6 +261,9 @@ def _policies(source: Any, task: BenchmarkTask, runs: int) -> list[Policy]:
         return _runs(_imported(source), task, runs)
     if source == RULE:
         return [TaskRule(task.task, task.ship)]
+    if source in LEARNING_RULES:
+        names = [shown.name for shown in task.task.observed(task.ship)]
+        return [LEARNING_RULES[source](names)]
     if source in controller_kinds():
         return [design(_kind(source, task), task)]
     if source.startswith(TUNED):
@@ -286,8 +281,13 @@ def _runs(source: Any, task: BenchmarkTask, runs: int) -> list[Policy]:
     """Make the runs of a policy, a function or a class of controllers."""
     is_policy = hasattr(source, "predict")
     if is_policy or "seed" not in inspect.signature(source).parameters:
-        return [_policy(source, task)]
-    return [_policy(partial(source, seed=seed), task) for seed in range(runs)]
+        policy = _policy(source, task)
+        return [policy]
+    policies = []
+    for seed in range(runs):
+        seeded = partial(source, seed=seed)
+        policies.append(_policy(seeded, task))
+    return policies
 
 
 def _policy(source: Any, task: BenchmarkTask) -> Policy:
@@ -330,18 +330,9 @@ def _module(text: str) -> ModuleType:
     """Import the module or file that a function is named in."""
     module, _, _ = text.rpartition(":")
     if module.endswith(".py"):
-        return load_file(Path(module))
-    try:
-        with working_folder():
-            found = import_module(module)
-    except Exception as error:  # a user's own module may raise anything
-        raise InputError(
-            f"controllers: expected module:function, got '{text}', which cannot be"
-            f" imported ({error})"
-        ) from None
-    if getattr(found, "__file__", None) is None:
-        raise InputError(f"controllers: expected a module with a file, got '{module}'")
-    return found
+        path = Path(module)
+        return load_file(path)
+    return import_named(module, text, "controllers")
 
 
 def source_files(text: str, task: BenchmarkTask) -> list[Path]:

@@ -1,7 +1,9 @@
 """The page of a benchmark: one HTML file with tables and the method."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from math import ceil
 from pathlib import Path
+from typing import Any
 
 from agents.benchmarking.results import BenchmarkResult
 from agents.output import check_page
@@ -10,6 +12,7 @@ from agents.suites.limits import LIMITED_FIGURES
 from shipgym.files import write_text
 from shipgym.pages import render
 from shipgym.pages.numbers import counted, number
+from shipgym.plots import Panel, axis, line, line_styles, panels
 
 #: Columns of a task's table: figures of `agents.rollouts.metrics` with their titles.
 METRICS = {
@@ -30,7 +33,6 @@ TITLES = {
     "ship": "score on the ship",
     "fresh": "in fresh episodes",
     "model": "on the model",
-    "far": "far from the design",
 }
 
 
@@ -65,10 +67,53 @@ def write_page(result: BenchmarkResult, path: str | Path) -> None:
         "limits": limits,
         "metrics": metrics,
         "titles": TITLES,
+        "sweeps": sweep_figure(result),
         "seeds": f"{seeds[0]} to {seeds[-1]}",
     }
     page = render("agents.benchmarking/page.html", **shown)
     write_text(page, target)
+
+
+def sweep_figure(result: BenchmarkResult) -> Any:
+    """Mean cost of each controller on the ship and along the sweep of each task."""
+    shown = []
+    for task in result.tasks:
+        panel = _sweep_panel(result, task)
+        shown.append(panel)
+    rows = ceil(len(shown) / 2)
+    height = 100 + 230 * rows
+    return panels(shown, height, 2)
+
+
+def _sweep_panel(result: BenchmarkResult, task: str) -> Panel:
+    """The curves of one task."""
+    about = result.summary["suite"]["tasks"][task]
+    styles = line_styles(result.summary["controllers"])
+    sets = ["ship"]
+    for on in result.summary["tasks"][task]:
+        if on.startswith("sweep"):
+            sets.append(on)
+
+    points = list(range(len(sets)))
+    curves = []
+    for name in result.cells(task):
+        cells = [result.cells(task, on)[name] for on in sets]
+        costs = [cell["cost"]["value"] for cell in cells]
+        curve = line(points, costs, name, **styles[name])
+        curves.append(curve)
+    changed = _sweep_text(about["sweep"])
+    x = axis(changed, tickvals=points)
+    y = axis("mean cost", type="log")
+    return Panel(curves, x, y, task)
+
+
+def _sweep_text(sweep: Sequence[Mapping[str, Any]]) -> str:
+    """What changes along a sweep."""
+    if not sweep:
+        return "no sweep"
+    *_, last = sweep
+    names = ", ".join(last)
+    return f"0: as ranked; then {names}"
 
 
 def _limits_text(limits: Mapping[str, float]) -> str:
@@ -79,7 +124,8 @@ def _limits_text(limits: Mapping[str, float]) -> str:
         kind = LIMITED_FIGURES[name]
         statistic = STATISTICS[kind]
         largest = number(limit)
-        parts.append(f"{title} {largest} ({statistic})")
+        part = f"{title} {largest} ({statistic})"
+        parts.append(part)
     if not parts:
         return ""
     limited = "; ".join(parts)

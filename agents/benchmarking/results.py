@@ -5,12 +5,9 @@ controller, task, set of episodes, run and seed.
 """
 
 import json
-import platform
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
-from importlib.metadata import PackageNotFoundError, version
 from os.path import isdir
 from pathlib import Path
 from typing import Any, Self
@@ -22,10 +19,10 @@ from agents.benchmarking.cells import Cells, Options
 from agents.benchmarking.entries import Entry, file_hash
 from agents.benchmarking.summary import Summary
 from agents.controllers.interface import model_hash
-from agents.output import check_writable, present
+from agents.output import check_results, versions
 from agents.suites.suite import BenchmarkTask, Suite
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_format, check_keys
+from shipgym.checks import check_choice, check_format
 from shipgym.drafts import atomic_path
 from shipgym.errors import InputError
 from shipgym.extras import axes_of, library
@@ -33,19 +30,8 @@ from shipgym.files import make_folder, read_json, write_json
 from shipgym.plots import MODEL
 
 RESULTS, EPISODES, PARTS = "results.json", "episodes.parquet", "parts"
-FORMAT, KIND = 4, "shipgym-benchmark"
-FIELDS = (
-    "format",
-    "kind",
-    "versions",
-    "suite",
-    "options",
-    "controllers",
-    "tasks",
-    "ranking",
-    "sha256",
-)
-PACKAGES = ("shipgym", "numpy", "numba", "scipy", "control")
+FORMAT, KIND = 5, "shipgym-benchmark"
+PACKAGES = ("numpy", "numba", "scipy", "control")
 REMEDY = "run `shipgym benchmark` again"
 
 
@@ -92,13 +78,13 @@ class BenchmarkResult:
                 first, *_ = about["refused"].values()
                 tasks = ", ".join(about["refused"])
                 failures.append(f"{name} could not run {tasks}: {first}")
-            for task, sets in self.summary["tasks"].items():
-                for on, cells in sets.items():
-                    if name in cells and cells[name]["failure"]:
-                        failures.append(
-                            f"{name} in {task}, {on}: {cells[name]['failure']}"
-                            f" ({cells[name]['failed']} episodes failed)"
-                        )
+            own = self.to_frame().query("controller == @name and failure != ''")
+            for failure, rows in own.groupby("failure", sort=False):
+                tasks = ", ".join(rows["task"].unique())
+                count = rows["failed"].sum()
+                failures.append(
+                    f"{name} in {tasks}: {failure} ({count} episodes failed)"
+                )
         return failures
 
     def figures(
@@ -110,11 +96,10 @@ class BenchmarkResult:
         """
         check_choice(controller, self.summary["controllers"], "controller")
         check_choice(task, self.tasks, "task")
-        check_choice(name, list(self.episodes.columns), "figure")
-        check_choice(on, set(self.episodes["set"]), "set")
-        rows = self.episodes.query("controller == @controller and task == @task")
-        figures: Floats = rows.loc[rows["set"] == on, name].to_numpy(np.float64)
-        return figures.reshape(-1, self.summary["options"]["episodes"])
+        own = self.episodes.query("controller == @controller and task == @task")
+        by_run = own[own["set"] == on].pivot(index="run", columns="seed", values=name)
+        figures: Floats = by_run.to_numpy(np.float64)
+        return figures
 
     def to_frame(self) -> pd.DataFrame:
         """Return a row for each controller in each set of episodes of each task.
@@ -141,14 +126,13 @@ class BenchmarkResult:
         """
         ax = axes_of(ax)
         for totals in self.summary["ranking"].values():
-            scores = {one["name"]: one["scores"].get("ship") for one in totals}
-            shown = {name: score for name, score in scores.items() if score}
-            if not shown:
-                continue
-            for name, score in shown.items():
-                ax.plot([score["low"], score["high"]], [name, name], color=MODEL)
-                ax.plot([score["value"]], [name], "o", color=MODEL)
-            break
+            scored = [one for one in totals if one["scores"]]
+            if scored:
+                names = [one["name"] for one in scored]
+                scores = pd.DataFrame([one["scores"]["ship"] for one in scored])
+                ax.hlines(names, scores["low"], scores["high"], color=MODEL)
+                ax.plot(scores["value"], names, "o", color=MODEL)
+                break
         ax.set_xlabel("score: cost of the rule over that of the controller")
         ax.invert_yaxis()
         return ax
@@ -180,19 +164,7 @@ def check_new(folder: Path, resume: bool) -> Path:
     Raises InputError saying what to do.
     """
     _pyarrow()  # a missing extra is reported now, not after the work
-    check_writable(folder)
-    names = present(folder) if folder.exists() else []
-    has_results = any(name in (RESULTS, EPISODES, PARTS) for name in names)
-    if names and not has_results:
-        raise InputError(
-            f"{folder}: expected results of a benchmark or nothing, got '{names[0]}';"
-            " choose another folder"
-        )
-    if has_results and not resume:
-        raise InputError(
-            f"{folder}: already contains results; continue with --resume (resume=True),"
-            " or choose another folder"
-        )
+    check_results(folder, (RESULTS, EPISODES, PARTS), resume)
     return folder
 
 
@@ -229,7 +201,7 @@ def collect(
     summary = {
         "format": FORMAT,
         "kind": KIND,
-        "versions": versions(),
+        "versions": versions(*PACKAGES),
         "suite": {
             "name": suite.name,
             "sha256": suite.sha256,
@@ -247,28 +219,16 @@ def collect(
     return BenchmarkResult(summary, computed.episodes)
 
 
-def versions() -> dict[str, str]:
-    """Return the versions of what the results depend on, and the processor."""
-    from llvmlite import binding
-
-    found = {
-        "python": platform.python_version(),
-        "processor": str(binding.get_host_cpu_name()),
-    }
-    for package in PACKAGES:
-        with suppress(PackageNotFoundError):
-            found[package] = version(package)
-    return found
-
-
 def _figures(cell: Mapping[str, Any]) -> dict[str, Any]:
-    figures = {name: of["mean"] for name, of in cell["metrics"].items()}
+    figures = {}
+    for name, statistics in cell["metrics"].items():
+        figures[name] = statistics["mean"]
     for part in ("cost", "score"):
         found = cell[part]
         figures[part] = found["value"]
         figures[f"{part}_low"] = found["low"]
         figures[f"{part}_high"] = found["high"]
-    counts = {part: cell[part] for part in ("runs", "lost", "failed")}
+    counts = {part: cell[part] for part in ("runs", "lost", "failed", "failure")}
     return figures | counts
 
 
@@ -280,18 +240,12 @@ def _about_entry(
     files: dict[str, str] = {}
     for task in tasks:
         files |= entry.fingerprint(task)
-    refused = {}
-    made = []
-    for task in tasks:
-        cell = cells[entry.name, task.name]
-        if cell.refused:
-            refused[task.name] = cell.refused
-        else:
-            made.append(cell)
+    own = {task.name: cells[entry.name, task.name] for task in tasks}
+    made = [cell for cell in own.values() if not cell.refused]
     return {
         "source": entry.source if entry.is_text else None,
         "files": files,
-        "refused": refused,
+        "refused": {task: one.refused for task, one in own.items() if one.refused},
         "ship_steps": float(np.mean([cell.ship_steps for cell in made] or [0.0])),
         "seconds": float(np.mean([cell.seconds for cell in made] or [0.0])),
     }
@@ -306,15 +260,13 @@ def load_results(path: str | Path) -> BenchmarkResult:
     if isdir(where):
         where = where / RESULTS
     summary = read_json(where, "file of benchmark results", REMEDY)
-    if summary.get("kind") != KIND:
-        raise InputError(
-            f"{where}: kind: expected '{KIND}', got {summary.get('kind')!r}"
-        )
+    kind = summary.get("kind")
+    if kind != KIND:
+        raise InputError(f"{where}: kind: expected '{KIND}', got {kind!r}")
     check_format(summary, FORMAT, str(where))
-    check_keys(summary, FIELDS, str(where), FIELDS)
     table = where.with_name(EPISODES)
-    content = {name: summary[name] for name in FIELDS if name != "sha256"}
-    if summary["sha256"] != _hash(content, table):
+    content = dict(summary)
+    if content.pop("sha256", "") != _hash(content, table):
         raise InputError(
             f"{where}: expected it and {EPISODES} as the benchmark wrote them, got"
             f" other content; {REMEDY}"

@@ -8,12 +8,17 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from agents.benchmarking.cells import Cell, Options, job_of, run_cell, run_job
-from agents.benchmarking.entries import Entry, read_entries
+from agents.benchmarking.cells import Options, job_of, read_cell, run_cell, run_job
+from agents.benchmarking.entries import Entry, read_entries, source_for
 from agents.benchmarking.results import PARTS, BenchmarkResult, check_new, collect
 from agents.jobs import JobEngine, run_jobs
 from agents.output import in_use
-from agents.suites.suite import DEFAULT_SUITE, N_EPISODES, load_suite
+from agents.suites.suite import (
+    DEFAULT_SUITE,
+    N_EPISODES,
+    BenchmarkTask,
+    load_suite,
+)
 from identification.progress import Progress
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
@@ -33,7 +38,7 @@ def benchmark(
     episodes: int = N_EPISODES,
     seed: int = 0,
     runs: int = 1,
-    allow_code: Sequence[str] = (),
+    allow_code: bool = False,
 ) -> BenchmarkResult:
     """Run controllers through the tasks of a suite and rank them.
 
@@ -66,8 +71,8 @@ def benchmark(
         Which episodes are scored: each seed has others.
     runs : int
         How often an entry that searches or learns is made.
-    allow_code : sequence of str
-        Python files and modules that a suite of your own may name.
+    allow_code : bool
+        Whether a suite of your own may name Python files and modules, which are run.
     """
     entries = read_entries(controllers)
     the_suite = load_suite(suite, allow_code)
@@ -77,17 +82,9 @@ def benchmark(
     check_whole(runs, "runs", at_least=1)
     options = Options(episodes, seed, runs, the_suite.budget)
     where = JobEngine(engine, workers, address)
-    everyone = {entry.source: entry for entry in entries if entry.is_text}
-    for task in selected:
-        # no other entry has no name
-        everyone.setdefault(task.rule, Entry(f" {task.rule}", task.rule))
-    pairs = [
-        (entry, task)
-        for entry, task in product(
-            dict.fromkeys([*entries, *everyone.values()]), selected
-        )
-        if entry in entries or entry.source == task.rule
-    ]
+    rules = {task.name: _rule(task, entries) for task in selected}
+    pairs = [*product(entries, selected)]
+    pairs += [(rules[task.name], task) for task in selected]
 
     def run(where: JobEngine) -> BenchmarkResult:
         jobs = {}
@@ -100,9 +97,9 @@ def benchmark(
         on_progress = progress and partial(progress, "tasks done")
         results = run_jobs(run_job, list(jobs.values()), where, on_progress)
         for name, result in zip(jobs, results, strict=True):
-            cells[name] = Cell(**result)
-        rules = {task.name: everyone[task.rule].name for task in selected}
-        return collect(the_suite, selected, entries, cells, rules, options)
+            cells[name] = read_cell(result)
+        names = {task: rule.name for task, rule in rules.items()}
+        return collect(the_suite, selected, entries, cells, names, options)
 
     if out is None:
         return run(where)
@@ -114,3 +111,11 @@ def benchmark(
             if not resume:
                 shutil.rmtree(folder / PARTS, ignore_errors=True)
             raise
+
+
+def _rule(task: BenchmarkTask, entries: Sequence[Entry]) -> Entry:
+    """Return the entry that is the rule of a task, or one with a name of its own."""
+    for entry in entries:
+        if source_for(entry.source, task) == task.rule:
+            return entry
+    return Entry(f" {task.rule}", task.rule)

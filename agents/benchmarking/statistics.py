@@ -19,6 +19,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.stats import gmean
 
 from shipgym.arrays import Floats, Integers, finite
 
@@ -26,40 +27,22 @@ from shipgym.arrays import Floats, Integers, finite
 Interval = dict[str, float | None]
 
 
-class Draws:
-    """Bootstrap draws of episodes and runs, the same for every controller.
+def drawn_means(values: Floats, task: str) -> Floats:
+    """Means over drawn runs and episodes of a task, shape (n_draws,).
 
-    Parameters
-    ----------
-    n_episodes : int
-        Number of episodes of each task.
-    seed : int
-        Seed of the draws.
-    n_draws : int
-        Number of draws of each task; each takes `n_episodes` with replacement.
+    `values`: shape (n_runs, n_episodes). The draws are the same for every controller.
     """
-
-    def __init__(self, n_episodes: int, seed: int = 0, n_draws: int = 2000) -> None:
-        self.n_episodes = n_episodes
-        self.n_draws = n_draws
-        self.seed = seed
-
-    def means(self, values: Floats, task: str) -> Floats:
-        """Means over drawn runs and episodes of a task, shape (n_draws,).
-
-        `values`: shape (n_runs, n_episodes).
-        """
-        n_runs, n = values.shape
-        random = np.random.default_rng([self.seed, *task.encode()])
-        even = np.full(n, 1.0 / n)
-        counts: Integers = random.multinomial(n, even, self.n_draws)
-        shares = counts / n
-        by_run = shares @ values.T
-        size = self.n_draws, n_runs
-        runs = random.integers(n_runs, size=size)
-        drawn = np.take_along_axis(by_run, runs, axis=1)
-        means: Floats = drawn.mean(axis=1)
-        return means
+    n_draws = 2000
+    n_runs, n = values.shape
+    random = np.random.default_rng([0, *task.encode()])
+    even = np.full(n, 1.0 / n)
+    counts: Integers = random.multinomial(n, even, n_draws)
+    shares = counts / n
+    by_run = shares @ values.T
+    runs = random.integers(n_runs, size=(n_draws, n_runs))
+    drawn = np.take_along_axis(by_run, runs, axis=1)
+    means: Floats = drawn.mean(axis=1)
+    return means
 
 
 def interval(value: float, draws: Floats) -> Interval:
@@ -70,13 +53,13 @@ def interval(value: float, draws: Floats) -> Interval:
     return {"value": finite(value), "low": finite(low), "high": finite(high)}
 
 
-def mean_cost(values: Floats, task: str, draws: Draws) -> Interval:
+def mean_cost(values: Floats, task: str) -> Interval:
     """Mean over runs and episodes of one task."""
-    return interval(float(values.mean()), draws.means(values, task))
+    return interval(float(values.mean()), drawn_means(values, task))
 
 
 def mean_score(
-    costs: Mapping[str, Floats], rule_costs: Mapping[str, Floats], draws: Draws
+    costs: Mapping[str, Floats], rule_costs: Mapping[str, Floats]
 ) -> Interval:
     """Geometric mean over tasks of the scores: every task counts the same.
 
@@ -86,25 +69,18 @@ def mean_score(
         Costs of a controller by task.
     rule_costs : mapping of str to array of shape (n_runs, n_episodes)
         Costs of the rule by task; tasks without them do not count.
-    draws : Draws
     """
     scores = []
     drawn_scores = []
     for task in sorted(costs.keys() & rule_costs.keys()):
         cost, rule_cost = costs[task], rule_costs[task]
-        scores.append(_score(cost.mean(), rule_cost.mean()))
-        of_rule = draws.means(rule_cost, task)
-        drawn = draws.means(cost, task)
+        scores.append(float(_score(cost.mean(), rule_cost.mean())))
+        of_rule = drawn_means(rule_cost, task)
+        drawn = drawn_means(cost, task)
         drawn_scores.append(_score(drawn, of_rule))
     if not scores:
         return interval(np.nan, np.zeros(0))
-    return interval(float(geometric_mean(scores)), geometric_mean(drawn_scores))
-
-
-def geometric_mean(values: ArrayLike) -> Floats:
-    """Geometric mean over the first axis."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.exp(np.log(values).mean(axis=0)))
+    return interval(float(gmean(scores)), gmean(np.array(drawn_scores)))
 
 
 def _score(cost: ArrayLike, rule_cost: ArrayLike) -> Floats:

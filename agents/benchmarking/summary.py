@@ -8,15 +8,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.stats import gmean
 
 from agents.benchmarking.cells import Cells, Options
-from agents.benchmarking.statistics import (
-    Draws,
-    geometric_mean,
-    mean_cost,
-    mean_score,
-)
-from agents.suites.benchmark_task import SETS, BenchmarkTask
+from agents.benchmarking.statistics import mean_cost, mean_score
+from agents.suites.benchmark_task import BenchmarkTask
 from agents.suites.limits import exceeded
 from agents.suites.suite import Suite
 from shipgym.arrays import Floats, finite
@@ -65,11 +61,6 @@ class Summary:
         figures = table.columns.difference(KEYS)
         return table.astype(dict.fromkeys(figures, np.float64))
 
-    @cached_property
-    def draws(self) -> Draws:
-        """Bootstrap draws that all controllers share."""
-        return Draws(self.options.episodes)
-
     def costs(self, name: str, on: str, part: str = "") -> dict[str, Floats]:
         """Costs of a controller by task, those of a part if it is given.
 
@@ -92,10 +83,10 @@ class Summary:
             found[task.name] = sets
             for on, name in product(task.sets, self.names):
                 cell = self.cells[name, task.name]
-                if cell.refused:
-                    continue
-                means = metrics[task.name, on, name]
-                sets[on][name] = self._of_cell(task, on, name, means)
+                if not cell.refused:
+                    means = metrics[task.name, on, name]
+                    figures = self._of_cell(task, on, name, means)
+                    sets[on][name] = figures
         return found
 
     def _of_cell(
@@ -109,8 +100,8 @@ class Summary:
         lost = figures["terminated"].sum()
         failed = figures["failed"].sum()
         return {
-            "cost": mean_cost(costs, task.name, self.draws),
-            "score": mean_score(own, rules, self.draws),
+            "cost": mean_cost(costs, task.name),
+            "score": mean_score(own, rules),
             "runs": len(costs),
             "lost": int(lost),
             "failed": int(failed),
@@ -145,7 +136,7 @@ class Summary:
             "name": name,
             "tasks": len(costs),
             "of": sum(task.part == part for task in self.suite.tasks),
-            "mean_cost": finite(float(geometric_mean(means))) if means else None,
+            "mean_cost": finite(float(gmean(means))) if means else None,
             "lost": sum(cell["lost"] for cell in cells),
             "failed": sum(cell["failed"] for cell in cells),
             "exceeding": [
@@ -155,15 +146,15 @@ class Summary:
         if total["tasks"] < total["of"]:
             return {**total, "scores": {}}
         scores = {}
-        for on in SETS:
+        sets = {on: 0 for task in self.tasks if task.part == part for on in task.sets}
+        for on in sets:
             mine, rules = self.costs(name, on, part), self.costs("", on, part)
-            if mine:
-                scores[on] = mean_score(mine, rules, self.draws)
+            scores[on] = mean_score(mine, rules)
         return {**total, "scores": scores}
 
 
 def _metrics(episodes: pd.DataFrame) -> dict[tuple[str, ...], dict[str, Any]]:
-    """Mean, median and 95th percentile of each figure that an episode has.
+    """Mean and 95th percentile of each figure that an episode has.
 
     By task, set and controller, and by figure.
     """
@@ -172,7 +163,6 @@ def _metrics(episodes: pd.DataFrame) -> dict[tuple[str, ...], dict[str, Any]]:
     found: dict[tuple[str, ...], dict[str, Any]] = {}
     for name, table in (
         ("mean", groups.mean()),
-        ("median", groups.median()),
         ("p95", groups.quantile(0.95)),
     ):
         for key, row in table.iterrows():

@@ -33,14 +33,6 @@ def autopilot_command(
     seed: Annotated[int, Option(min=0, help="Random seed of draws and episodes.")] = 0,
     *,
     options: dict[str, Any],
-    agents: Annotated[
-        list[str] | None,
-        Option(
-            "--agent",
-            metavar="AGENT",
-            help="Also run this autopilot, a file or a name; repeatable.",
-        ),
-    ] = None,
     autopilots: Annotated[
         str | None,
         Option(
@@ -75,7 +67,6 @@ def autopilot_command(
             draws=draws,
             seed=seed,
             options=options,
-            agents=agents or (),
             designs=designs,
             progress=on_progress,
         )
@@ -100,9 +91,12 @@ def print_autopilot(result: AutopilotResult, report: Path, draws: int) -> None:
 
     for warning in model_warnings(result.identification):
         warn(warning)
-    if result.verification is not None:
-        for name, reason in result.verification.refused.items():
+    found = result.verification
+    if found is not None:
+        for name, reason in found.refused.items():
             warn(f"no {name.upper()} autopilot: {reason}")
+        if found.run_next:
+            say(f"run next: {found.run_next}")
     say(f"report: {report}")
 
 

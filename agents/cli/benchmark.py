@@ -65,21 +65,22 @@ def benchmark_command(
     seed: Seed = 0,
     runs: Runs = 1,
     page: Page = True,
-    allow_code: AllowCode = None,
+    allow_code: AllowCode = False,
 ) -> None:
     """Rank controllers on the tasks of a suite. All run the same episodes."""
-    from agents.benchmarking.entries import read_entries
+    from agents.benchmarking.entries import names_code, read_entries
     from agents.benchmarking.page import write_page
     from agents.benchmarking.run import benchmark
     from agents.cli.terminal import progress_bars, warn
 
-    entries = read_entries(controllers)
-    for entry in entries:
-        if entry.is_code:
+    for given in controllers.split(","):
+        source = given.rpartition("=")[2].strip()
+        if names_code(source):
             warn(
-                f"'{entry.source}' runs as part of this command. This is not a sandbox:"
-                " the code can read your files."
+                f"'{source}' runs as part of this command. This is not a sandbox: the"
+                " code can read your files."
             )
+    entries = read_entries(controllers)
     try:
         with progress_bars() as progress:
             result = benchmark(
@@ -95,7 +96,7 @@ def benchmark_command(
                 episodes=episodes,
                 seed=seed,
                 runs=runs,
-                allow_code=allow_code or (),
+                allow_code=allow_code,
             )
         if page:
             write_page(result, out / "index.html")

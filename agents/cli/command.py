@@ -30,11 +30,7 @@ Address = Annotated[
     ),
 ]
 AllowCode = Annotated[
-    list[str] | None,
-    Option(
-        metavar="CODE",
-        help="Python file or module that your suite may name; repeatable.",
-    ),
+    bool, Option("--allow-code", help="Run Python files that your suite names.")
 ]
 Out = Annotated[Path, Option(metavar="FOLDER", help="Folder for the results.")]
 Json = Annotated[

@@ -109,7 +109,8 @@ def name_finding(name: str) -> Finding:
     """
     what = f"import {name}"
     packages = importlib.metadata.packages_distributions().get(name, ())
-    others = sorted(set(packages) - {"shipgym"})
+    strange = set(packages) - {"shipgym"}
+    others = sorted(strange)
     if others:
         return Finding(
             what,

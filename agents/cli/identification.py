@@ -85,7 +85,8 @@ def _chosen(
     from shipgym.trials.ship_file import ShipFile
 
     read = ShipFile.load(ship)
-    return read, identification_settings(read, options, *unnamed)
+    settings = identification_settings(read, options, *unnamed)
+    return read, settings
 
 
 def _check_stable(result: IdentificationResult) -> None:

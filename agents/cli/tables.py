@@ -196,7 +196,7 @@ def ranking_table(result: AutopilotResult) -> Table:
     )
     for name in metrics["ranking"]:
         figures = metrics["controllers"][name]
-        margins = figures["margins"] or {}
+        margins = figures["margins"]
         table.add_row(
             name.upper(),
             number(figures["cost_mean"], 2),
@@ -212,7 +212,5 @@ def ranking_table(result: AutopilotResult) -> Table:
 
 
 def _margin(margins: Mapping[str, Any], name: str, decimals: int) -> str:
-    """A margin of an autopilot: inf where it is unbounded, a dash for a learned one."""
-    if name not in margins:
-        return "-"
+    """A margin of an autopilot: inf where it is unbounded."""
     return "inf" if margins[name] is None else number(margins[name], decimals)

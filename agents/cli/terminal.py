@@ -113,15 +113,15 @@ def _bars() -> Bars:
 
 
 @contextmanager
-def progress_bars() -> Iterator[Progress | None]:
+def progress_bars() -> Iterator[Progress]:
     """Bars on standard error, one for each stage, with the remaining time.
 
     Yields a function that is called with the stage, the units done and their total, 0
-    where that is unknown; None where nothing is shown, as with `--json` and `--quiet`.
-    Off a terminal a line a minute says how far the work is.
+    where that is unknown; with `--json` and `--quiet` it shows nothing. Off a terminal
+    a line a minute says how far the work is.
     """
     if console.quiet:
-        yield None
+        yield lambda *_: None
         return
     if not err.is_terminal:
         yield _line_a_minute()
@@ -157,8 +157,8 @@ def identifying(stage: str) -> Iterator[None]:
     from identification.progress import PROGRESS
 
     with progress_bars() as on_progress:
-        token = PROGRESS.set(on_progress or PROGRESS.get())
-        PROGRESS.get()(stage, 0, 0)
+        token = PROGRESS.set(on_progress)
+        on_progress(stage, 0, 0)
         try:
             yield
         finally:
@@ -166,17 +166,16 @@ def identifying(stage: str) -> Iterator[None]:
 
 
 @contextmanager
-def training_bar() -> Iterator[Callable[[TrainingProgress], None] | None]:
+def training_bar() -> Iterator[Callable[[TrainingProgress], None]]:
     """Progress of a training: a bar, and a line for each evaluation.
 
-    Yields a function that is called with the progress; None where nothing is shown.
+    Yields a function that is called with the progress.
     """
     with progress_bars() as bars:
 
         def on_progress(now: TrainingProgress) -> None:
-            if bars is not None:
-                bars("training", now.steps, now.total)
-            if now.evaluated:
+            bars("training", now.steps, now.total)
+            if now.evaluated and not console.quiet:
                 name, best = min(now.yardsticks.items(), key=lambda one: one[1])
                 err.print(
                     f"step {now.steps:,} of {now.total:,}, {now.seconds:.0f} s: cost"
@@ -184,4 +183,4 @@ def training_bar() -> Iterator[Callable[[TrainingProgress], None] | None]:
                     soft_wrap=True,
                 )
 
-        yield None if bars is None else on_progress
+        yield on_progress

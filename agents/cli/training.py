@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -127,16 +126,9 @@ def _train(plan: TrainingPlan, out: Path, resume: bool) -> TrainingResult:
     from agents.training.run_folder import CHECKPOINT
     from agents.training.training import train
 
-    words = ["shipgym", *sys.argv[1:]]
     try:
         with training_bar() as on_progress:
-            return train(
-                plan,
-                out,
-                resume=resume,
-                on_progress=on_progress,
-                command=shlex.join(words),
-            )
+            return train(plan, out, resume=resume, on_progress=on_progress)
     except KeyboardInterrupt:
         message = "interrupted"
         if (out / CHECKPOINT).is_file():
@@ -197,13 +189,12 @@ def tune_command(
     plan = make_plan(**asked, seed=seed)
     try:
         with progress_bars() as bars:
-
-            def on_progress(done: int, total: int) -> None:
-                if bars is not None:
-                    bars("trials", done, total)
-
             study = tune(
-                plan, out, trials, fixed=asked["settings"], on_progress=on_progress
+                plan,
+                out,
+                trials,
+                fixed=asked["settings"],
+                on_progress=partial(bars, "trials"),
             )
     except KeyboardInterrupt:
         fail(
@@ -220,17 +211,10 @@ def print_tuning(study: Any, out: Path) -> None:
     from agents.training.tuning import BEST
 
     path, best = out / BEST, study.best_trial
-    trials = [
-        {
-            "number": trial.number,
-            "cost": trial.value,
-            "ended": trial.state.name.lower(),
-            "parameters": trial.params,
-        }
-        for trial in study.trials
-    ]
-    answer({"trials": trials, "best": best.number, "settings": str(path)})
-    costs = [number(trial.value, 3) for trial in (best, study.trials[0])]
+    trials = study.trials
+    found = {"trials": len(trials), "best": best.number, "cost": best.value}
+    answer({**found, "parameters": best.params, "settings": str(path)})
+    costs = [number(trial.value, 3) for trial in (best, trials[0])]
     say(
         f"lowest mean cost of a held-out episode: {costs[0]}, trial {best.number} of"
         f" {len(trials)}; {costs[1]} with the settings as they were"

@@ -50,8 +50,7 @@ def trials_command(
     with progress_bars() as bars:
 
         def on_progress(done: int) -> None:
-            if bars is not None:
-                bars("models drawn", done, draws)
+            bars("models drawn", done, draws)
 
         trials = standard_trials(ship, draws, seed, on_progress, water_depth)
 
@@ -65,6 +64,7 @@ def _print_trials(trials: StandardTrials, page: Path | None) -> None:
     """Print tables of the standard manoeuvres, and where the page was written."""
     from agents.cli.tables import criteria_notes, criteria_table, manoeuvre_table
     from agents.cli.terminal import console, say, warn
+    from shipgym.manoeuvres.criteria import trials_to_run
 
     console.print(manoeuvre_table(trials.indices, trials.water))
     console.print()
@@ -76,6 +76,8 @@ def _print_trials(trials: StandardTrials, page: Path | None) -> None:
             " them."
         )
     say(*criteria_notes(trials.criteria))
+    if run_next := trials_to_run(trials.criteria):
+        say(f"run next: {run_next}")
     for name, reason in trials.refused.items():
         warn(f"no {name}: {reason}")
     if page is not None:

@@ -40,7 +40,8 @@ def _section(
     for manoeuvre in family:
         for index in trials.indices[manoeuvre]:
             by_manoeuvre = [trials.indices[other].get(index) for other in family]
-            rows[readable_index(index)] = by_manoeuvre
+            words = readable_index(index)
+            rows[words] = by_manoeuvre
     refused = {key: why for key, why in trials.refused.items() if key in family}
     return {
         "name": name,

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -26,8 +27,10 @@ if TYPE_CHECKING:  # whoever shares work out does without
 FIRST_SEED = 1_000_000
 N_EPISODES = 100
 #: Sets of episodes: on the ship, ranked; on the ship in other episodes; on the model
-#: that controllers are made for; on the ship far from what they were made for.
-SETS = ("ship", "fresh", "model", "far")
+#: that controllers are made for. Those of a sweep follow: "sweep-1", ...
+SETS = ("ship", "fresh", "model")
+#: Share of the episodes of other sets that one of a sweep has.
+SWEPT = 1 / 3
 
 
 class Scenario(NamedTuple):
@@ -65,8 +68,8 @@ class BenchmarkTask:
         What else differs on the ship: keywords of the environment; `gear`, fields of
         the steering gear; `terms`, accelerations that are added, by equation and
         formula (`shipgym.ships.terms.read_terms`).
-    far : mapping
-        The same in the episodes far from the design.
+    sweep : sequence of mapping
+        The same by set of episodes, ever further from the design.
     part : str
         Tasks of one part are ranked together.
     rule : str
@@ -75,8 +78,6 @@ class BenchmarkTask:
         `Suite.source` of its suite.
     limits : mapping of str to float
         Largest values of figures (`agents.suites.limits`).
-    given : Scenario, optional
-        Of a model that is at hand, in no file and no suite.
     """
 
     name: str
@@ -86,12 +87,11 @@ class BenchmarkTask:
     options: Mapping[str, Any] = field(default_factory=dict)
     true_ship: str = ""
     judge: Mapping[str, Any] = field(default_factory=dict)
-    far: Mapping[str, Any] = field(default_factory=dict)
+    sweep: Sequence[Mapping[str, Any]] = ()
     part: str = "steering"
     rule: str = "preview-lq"
     suite: str = ""
     limits: Mapping[str, float] = field(default_factory=dict)
-    given: Scenario | None = None
 
     def __post_init__(self) -> None:
         if not self.environment.endswith(".py"):
@@ -128,20 +128,22 @@ class BenchmarkTask:
     @cached_property
     def design(self) -> Scenario:
         """Scenario that controllers are made for."""
-        return self.given or self._scenario(self.ship, self.options)
+        return self._scenario(self.ship, self.options)
 
     @property
     def sets(self) -> tuple[str, ...]:
         """Its sets of episodes, of `SETS`."""
         judged = bool(self.true_ship or self.judge)
-        kept = {"model": judged, "far": bool(self.far)}
-        return tuple(one for one in SETS if kept.get(one, True))
+        known = SETS if judged else SETS[:2]
+        return known + tuple(f"sweep-{k}" for k in range(1, len(self.sweep) + 1))
 
     def scenario(self, on: str) -> Scenario:
         """Scenario of a set of episodes."""
         if on == "model":
             return self.design
-        changes = {**self.judge, **(self.far if on == "far" else {})}
+        changes = dict(self.judge)
+        if on not in SETS:
+            changes |= self.sweep[int(on.removeprefix("sweep-")) - 1]
         gear = changes.pop("gear", {})
         terms = changes.pop("terms", {})
         given = load_model(self.true_ship) if self.true_ship else self.ship
@@ -159,12 +161,12 @@ class BenchmarkTask:
     @cached_property
     def design_task(self) -> Self:
         """The task as controllers are given it: without the ship behind the model."""
-        return replace(self, true_ship="", judge={}, far={})
+        return replace(self, true_ship="", judge={}, sweep=())
 
     @cached_property
     def ship(self) -> ShipModel:
         """Model that controllers are made for."""
-        return self.given.ship if self.given else load_model(self.model)
+        return load_model(self.model)
 
     @property
     def task(self) -> Task:
@@ -196,8 +198,9 @@ class BenchmarkTask:
     @property
     def files(self) -> list[Path]:
         """Files of the user's own that it names: tasks, models, rewards, sensors."""
-        options = {**self.options, **self.judge, **self.far}
-        named = [self.environment, self.model, self.true_ship, *options.values()]
+        named: list[Any] = [self.environment, self.model, self.true_ship]
+        for options in (self.options, self.judge, *self.sweep):
+            named += options.values()
         suffixes = (".py", ".json")
         files = []
         for name in named:
@@ -214,9 +217,13 @@ class BenchmarkTask:
 
 
 def judging_seeds(on: str, number: int, seed: int = 0) -> Integers:
-    """Seeds of so many episodes of a set that are scored; others for each `seed`."""
+    """Seeds of a set of episodes that are scored; others for each `seed`.
+
+    `number`: of the episodes of a set, of which one of a sweep has a part.
+    """
     first = 2 * FIRST_SEED if on == "fresh" else FIRST_SEED
-    return first + N_EPISODES * seed + np.arange(number)
+    sailed = number if on in SETS else ceil(SWEPT * number)
+    return first + N_EPISODES * seed + np.arange(sailed)
 
 
 def with_terms(ship: ShipModel, terms: Mapping[str, Mapping[str, float]]) -> ShipModel:

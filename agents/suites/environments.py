@@ -3,6 +3,7 @@
 from importlib import import_module
 from os.path import isfile
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
 from shipgym import InputError
@@ -65,7 +66,7 @@ def read_environment(
 
     module, colon, name = text.rpartition(":")
     if colon:
-        _import(module, text, where)
+        import_named(module, text, where)
     options = dict(_registered(name, where))
     for keyword in PACE:
         options.pop(keyword, None)
@@ -81,13 +82,17 @@ def read_environment(
     )
 
 
-def _import(module: str, text: str, where: str) -> None:
+def import_named(module: str, text: str, where: str) -> ModuleType:
+    """Import a module of a text ``module:name``, from the working folder too.
+
+    Raises InputError, which begins with `where`, if it cannot be imported.
+    """
     try:
         with working_folder():
-            import_module(module)
+            return import_module(module)
     except Exception as error:  # whatever the module does
         raise InputError(
-            f"{where}: expected module:id, got '{text}', which cannot be imported"
+            f"{where}: expected module:name, got '{text}', which cannot be imported"
             f" ({type(error).__name__}: {error})"
         ) from None
 

@@ -5,7 +5,7 @@ or a user's own.
 """
 
 import hashlib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -28,7 +28,7 @@ from shipgym.checks import (
     data_only,
     placed,
 )
-from shipgym.files import parse_toml, read_bytes, read_json
+from shipgym.files import LARGEST_TOML, parse_toml, read_json, read_text
 
 __all__ = [
     "DEFAULT_SUITE",
@@ -53,7 +53,7 @@ FIELDS = (
     "options",
     "ship",
     "judge",
-    "far",
+    "sweep",
     "part",
     "rule",
     "limits",
@@ -88,9 +88,7 @@ class Suite:
         return tuple(self.task(name) for name in dict.fromkeys(names))
 
 
-def load_suite(
-    suite: str | Path = DEFAULT_SUITE, allow_code: Collection[str] = ()
-) -> Suite:
+def load_suite(suite: str | Path = DEFAULT_SUITE, allow_code: bool = False) -> Suite:
     """Read a shipped suite by name, or a suite of the user's own.
 
     Models and ships of a shipped one are loaded when they are used.
@@ -102,22 +100,15 @@ def load_suite(
     ----------
     suite : str or Path
         A name, or the path of a TOML file; relative paths in it begin at its folder.
-    allow_code : collection of str
-        Python files and modules that the suite may name, as it writes them, or their
-        paths. A suite is data: it runs no code that its user has not named too.
+    allow_code : bool
+        Whether the suite may name Python files and modules, which are run.
     """
     where = str(suite)
     if not where.endswith(".toml"):
         return _shipped(where)
     path = Path(where).resolve()
-    largest_suite = 1_000_000  # bytes
-    content = read_bytes(path, "TOML file of a suite", largest_suite)
-    try:
-        text = content.decode()
-    except UnicodeDecodeError:
-        raise InputError(f"{where}: expected UTF-8, got other bytes") from None
-    source = str(path)
-    found = parse_suite(text, where, path.parent, allow_code, source)
+    text = read_text(path, "TOML file of a suite", LARGEST_TOML)
+    found = parse_suite(text, where, path.parent, allow_code, str(path))
     for task in found.tasks:
         field = f"{where}: tasks.{task.name}"
         with placed(field):
@@ -132,14 +123,12 @@ def _shipped(name: str) -> Suite:
     return parse_suite(text, f"suite '{name}'", FOLDER, source=name)
 
 
-def find_task(
-    name: str, suite: str | Path = DEFAULT_SUITE, allow_code: Collection[str] = ()
-) -> BenchmarkTask:
+def find_task(name: str) -> BenchmarkTask:
     """Return the task that controllers are made for: without the ship behind the model.
 
-    Raises InputError for an unknown name, with the nearest, or as `load_suite`.
+    Raises InputError for an unknown name, with the nearest.
     """
-    return load_suite(suite, allow_code).task(name).design_task
+    return load_suite().task(name).design_task
 
 
 def suite_file(suite: str, what: str) -> Path:
@@ -170,7 +159,7 @@ def parse_suite(
     text: str,
     where: str,
     folder: Path = Path(),
-    allow_code: Collection[str] = (),
+    allow_code: bool = False,
     source: str = "",
 ) -> Suite:
     """Read a suite from its TOML text; its models and ships are loaded when used.
@@ -183,76 +172,71 @@ def parse_suite(
     check_keys(content, ("name", "budget", "tasks"), where)
     budget = check_number(content.get("budget", 1e12), f"{where}: budget", above=0.0)
     name = check_text(content.get("name"), f"{where}: name")
-    reader = _Reader(folder, allow_code)
     tasks = []
     for task_name, value in check_table(
         content.get("tasks"), f"{where}: tasks"
     ).items():
-        task = reader.read(task_name, value, f"{where}: tasks.{task_name}")
+        place = f"{where}: tasks.{task_name}"
+        table = check_table(value, place, FIELDS)
+        if not allow_code:
+            _check_data(table, place)
+        task = _read_task(task_name, table, folder, place)
         tasks.append(replace(task, suite=source))
-    sha256 = hashlib.sha256(text.encode()).hexdigest()
-    return Suite(name, tuple(tasks), source, sha256, budget)
+    return Suite(name, tuple(tasks), source, _sha256(text), budget)
 
 
-@dataclass(frozen=True)
-class _Reader:
-    """Reads the tasks of a suite."""
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
-    folder: Path
-    allow_code: Collection[str] = ()
 
-    def read(self, name: str, value: Any, where: str) -> BenchmarkTask:
-        """Return a task."""
-        table = check_table(value, where, FIELDS)
-        field = f"{where}.environment"
-        text = check_text(table.get("environment"), field)
-        self.check_code(text, field)
-        self.check_code(str(table.get("rule", "")), f"{where}.rule")
-        given: dict[str, Any] = self.resolved(table, where)
-        options = dict(check_table(given.pop("options", {}), f"{where}.options"))
-        if "sea" in given:
-            options["sea"] = given.pop("sea")
-        environment = read_environment(text, self.folder, field)
-        options = {**environment.options, **options}
-        default_model = options.pop("model", None)
-        given["model"] = given.get("model", default_model)
-        for named in {"model", "ship", "why", "part", "rule"} & given.keys():
-            check_text(given[named], f"{where}.{named}")
-        for named in ("judge", "far"):
-            check_table(given.get(named, {}), f"{where}.{named}")
-        limits = read_limits(given.pop("limits", {}), f"{where}.limits")
-        given["true_ship"] = given.pop("ship", "")
-        given |= {"environment": environment.name, "options": options}
-        with placed(where):
-            return BenchmarkTask(name=name, limits=limits, **given)
-
-    def check_code(self, text: str, where: str) -> None:
-        """Refuse code that the user has not named too."""
-        is_code = ":" in text or text.endswith(".py")
-        if is_code and not self.allows(text):
+def _check_data(table: Mapping[str, Any], where: str) -> None:
+    """Refuse a task that names code."""
+    for name in ("environment", "rule"):
+        text = str(table.get(name, ""))
+        names_code = ":" in text or text.endswith(".py")
+        if names_code:
             raise InputError(
-                f"{where}: expected no code that you have not named yourself, got"
-                f" '{text}'; if you trust it: --allow-code {text}"
+                f"{where}.{name}: expected no code, got '{text}'; if you trust the"
+                " suite: --allow-code"
             )
+    data_only(table, where)
 
-    def allows(self, text: str) -> bool:
-        """Tell whether the user has named this code too."""
-        paths = [Path(code).resolve() for code in self.allow_code]
-        return text in self.allow_code or (self.folder / text).resolve() in paths
 
-    def resolved(self, value: Any, where: str) -> Any:
-        """Copy a value of TOML; paths of files become absolute, code is refused."""
-        if isinstance(value, Mapping):
-            parts = {}
-            for name, part in value.items():
-                if not self.allows(str(part)):
-                    data_only({name: part} if isinstance(part, str) else {}, where)
-                parts[name] = self.resolved(part, f"{where}.{name}")
-            return parts
-        if isinstance(value, list):
-            return [self.resolved(part, where) for part in value]
-        if isinstance(value, str) and value.endswith((".py", ".json")):
-            if not self.allows(value):
-                data_only(value, where)
-            return str((self.folder / value).resolve())
-        return value
+def _read_task(
+    name: str, table: Mapping[str, Any], folder: Path, where: str
+) -> BenchmarkTask:
+    """Return a task from its table; relative paths in it begin at the folder."""
+    field = f"{where}.environment"
+    text = check_text(table.get("environment"), field)
+    given: dict[str, Any] = _resolved(table, folder)
+    options = dict(check_table(given.pop("options", {}), f"{where}.options"))
+    if "sea" in given:
+        options["sea"] = given.pop("sea")
+    environment = read_environment(text, folder, field)
+    options = {**environment.options, **options}
+    default_model = options.pop("model", None)
+    given["model"] = given.get("model", default_model)
+    for named in {"model", "ship", "why", "part", "rule"} & given.keys():
+        check_text(given[named], f"{where}.{named}")
+    check_table(given.get("judge", {}), f"{where}.judge")
+    sweep = given.get("sweep", ())
+    for k, point in enumerate(sweep, start=1):
+        check_table(point, f"{where}.sweep-{k}")
+    limits = given.pop("limits", {})
+    given["limits"] = read_limits(limits, f"{where}.limits")
+    given["true_ship"] = given.pop("ship", "")
+    given["environment"] = environment.name
+    given["options"] = options
+    with placed(where):
+        return BenchmarkTask(name=name, **given)
+
+
+def _resolved(value: Any, folder: Path) -> Any:
+    """Copy a value of TOML; paths of files become absolute."""
+    if isinstance(value, Mapping):
+        return {name: _resolved(part, folder) for name, part in value.items()}
+    if isinstance(value, list):
+        return [_resolved(part, folder) for part in value]
+    if isinstance(value, str) and value.endswith((".py", ".json")):
+        return str((folder / value).resolve())
+    return value

@@ -26,7 +26,6 @@ from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask
 from agents.training.controller_space import Setting, search_space
 from shipgym.arrays import Floats, Integers
-from shipgym.checks import check_number, check_whole
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.extras import library
@@ -58,11 +57,6 @@ class SearchBudget:
     evaluations: int = 100_000
     episodes: int = 16
 
-    def __post_init__(self) -> None:
-        check_number(self.seconds, "seconds", above=0.0)
-        check_whole(self.evaluations, "evaluations", at_least=1)
-        check_whole(self.episodes, "episodes", at_least=1)
-
 
 @dataclass(frozen=True)
 class FoundSettings:
@@ -89,8 +83,6 @@ class FoundSettings:
     seconds: float
 
 
-#: Called with processor seconds spent, the whole budget of them, and the least cost.
-OnProgress = Callable[[float, float, float], None]
 #: Mean cost of each of some settings, shape (n,); `REFUSED` of those without a design.
 Costs = Callable[[Sequence[Mapping[str, float]]], Floats]
 #: Called with the number of a set of episodes, from 0.
@@ -111,7 +103,6 @@ def tune_controller(
     budget: SearchBudget | None = None,
     *,
     seed: int = 0,
-    on_progress: OnProgress | None = None,
 ) -> FoundSettings:
     """Search the settings of a controller on the model of a task.
 
@@ -127,8 +118,6 @@ def tune_controller(
     budget : SearchBudget, optional
     seed : int
         Of the search.
-    on_progress : callable, optional
-        Called after each generation.
     """
     spent = time.process_time()
     budget = budget or SearchBudget()
@@ -142,7 +131,6 @@ def tune_controller(
         budget,
         seed=seed,
         renew=episodes.renew,
-        on_progress=on_progress,
     )
 
     start = {setting.name: setting.start for setting in space}
@@ -211,7 +199,6 @@ def search(
     *,
     seed: int = 0,
     renew: Renew | None = None,
-    on_progress: OnProgress | None = None,
 ) -> SearchResult:
     """Search for the least cost by CMA-ES, within a budget.
 
@@ -227,7 +214,6 @@ def search(
     renew : callable, optional
         Exchanges the episodes that costs are of; called before the first of every six
         generations.
-    on_progress : callable, optional
     """
     cma: Any = library("cma", "tune", "searching settings needs it")
     began = time.process_time()
@@ -263,8 +249,6 @@ def search(
         if found[first] < least:
             least = float(found[first])
             best = candidates[first]
-        if on_progress is not None:
-            on_progress(spent, budget.seconds, least)
     mean = settings_at(strategy.result.xfavorite, space)
     return SearchResult(best, mean, evaluations)
 

@@ -129,7 +129,9 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
 
 def _check_ships(venv: Any, base: Policy) -> None:
     """Refuse ships whose commands a base cannot be added to, and a base of others."""
-    pace = venv.get_attr("pace", 0)[0] if venv.has_attr("pace") else None
+    pace = None
+    if venv.has_attr("pace"):
+        pace = venv.get_attr("pace", 0)[0]
     if isinstance(pace, Pace) and pace != Pace():
         raise InputError(
             f"venv: expected steps of one control interval, got {pace}; give"

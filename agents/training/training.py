@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from agents.agent_file import load_agent
-from agents.output import in_use
+from agents.output import check_results, in_use, versions
 from agents.policies.policy import LearnedPolicy
 from agents.training import run_folder
 from agents.training.evaluation import HeldOut, TrainingProgress, TrainingResult
@@ -55,7 +55,6 @@ def train(
     *,
     resume: bool = False,
     on_progress: Callable[[TrainingProgress], None] | None = None,
-    command: str = "train()",
     evaluation_episodes: int = N_EVALUATIONS,
     save_seconds: float = 45.0,
 ) -> TrainingResult:
@@ -76,8 +75,6 @@ def train(
     on_progress : callable, optional
         Called with the progress before each rollout. An exception of it ends the
         training.
-    command : str
-        Command line that is written into the run's folder.
     evaluation_episodes : int
         Episodes held out, on which the policy is chosen.
     save_seconds : float
@@ -91,14 +88,14 @@ def train(
             if resume:
                 run_folder.check_resumable(folder, plan)
             else:
-                run_folder.check_new(folder)
+                check_results(folder, [run_folder.RUN], resume=False)
         stack.enter_context(_one_thread())
         run = _Run(plan, folder, evaluation_episodes, save_seconds)
         run.on_progress = on_progress
         if folder is not None and resume:
             run.restore(folder / run_folder.CHECKPOINT)
         elif folder is not None:
-            run_folder.begin_folder(folder, plan, command)
+            run_folder.begin_folder(folder, plan)
         return run.learn()
 
 
@@ -233,17 +230,14 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
 
     def _record(self) -> dict[str, Any]:
         """Return how a policy was made, without times."""
-        first = self.plan.training_seed
         seeds = self.held_out.seeds.tolist()
         return {
             **self.plan.configuration(),
-            "training_seeds": [first, first + self.plan.settings.ships - 1],
             "evaluation_seeds": [seeds[0], seeds[-1]],
             "steps": self.steps,
             "cost": self.curve[-1]["cost"],
-            "lq_cost": self.held_out.costs.get("LQ"),
             "curve": [[row["steps"], row["cost"]] for row in self.curve],
-            "versions": run_folder.versions(),
+            "versions": versions(*run_folder.PACKAGES),
         }
 
     def save(self) -> None:

@@ -11,10 +11,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from agents.output import in_use
+from agents.output import check_results, in_use
 from agents.training.evaluation import TrainingProgress
 from agents.training.plan import TrainingPlan, check_same
-from agents.training.run_folder import check_empty
 from agents.training.settings import suggested
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
@@ -67,7 +66,8 @@ def tune(
         if trial.number > 0:
             settings = suggested(settings, trial, fixed)
         trial.set_user_attr("settings", settings.to_dict())
-        return lowest_cost(replace(plan, settings=settings), trial)
+        tried = replace(plan, settings=settings)
+        return lowest_cost(tried, trial)
 
     def after(study: Any, trial: Any) -> None:
         finished = trial.state is optuna.trial.TrialState.COMPLETE
@@ -91,9 +91,8 @@ def tune(
 def open_study(folder: Path, plan: TrainingPlan, fixed: Collection[str] = ()) -> Any:
     """Open the study in a folder, or begin one; InputError if it is another."""
     path = folder / STUDY
-    if not path.is_file():
-        check_empty(folder, "tuning study")
-        make_folder(folder)
+    check_results(folder, [STUDY], resume=True)
+    make_folder(folder)
     study = optuna.create_study(
         storage=f"sqlite:///{path}",
         study_name="shipgym",
@@ -118,7 +117,8 @@ def lowest_cost(plan: TrainingPlan, trial: Any) -> float:
 
     def report(now: TrainingProgress) -> None:
         if now.evaluated and now.steps > 0:
-            trial.report(now.cost, now.steps // plan.settings.evaluate_every)
+            number = now.steps // plan.settings.evaluate_every
+            trial.report(now.cost, number)
             if trial.should_prune():
                 raise optuna.TrialPruned
 

@@ -15,32 +15,22 @@ from agents.suites.suite import BenchmarkTask
 from shipgym.errors import InputError
 
 
-class ZeroAction:
-    """Commands nothing: the rudder amidships, the shaft stopped."""
+class RandomActions:
+    """Commands that are drawn anew in each control interval, evenly from [-1, 1].
 
-    def __init__(self, n_commands: int) -> None:
+    With the range 0 nothing: the rudder amidships, the shaft stopped.
+    """
+
+    def __init__(self, n_commands: int, largest: float = 1.0) -> None:
         self.n_commands = n_commands
-
-    def commands(self, n_ships: int) -> Any:
-        """Return the commands of ships, shape (n_ships, n_commands)."""
-        return np.zeros((n_ships, self.n_commands), dtype=np.float32)
+        self.largest = largest
+        self.random = np.random.default_rng(0)
 
     def predict(self, observation: Any, state: Any = None, *_: Any) -> Any:
         """Command as `Policy.predict`, whatever is observed."""
-        return self.commands(len(observation)), state
-
-
-class RandomActions(ZeroAction):
-    """Commands that are drawn anew in each control interval, evenly from [-1, 1]."""
-
-    def __init__(self, n_commands: int) -> None:
-        super().__init__(n_commands)
-        self.random = np.random.default_rng(0)
-
-    def commands(self, n_ships: int) -> Any:
-        """Return the commands of ships, shape (n_ships, n_commands)."""
-        shape = (n_ships, self.n_commands)
-        return self.random.uniform(-1.0, 1.0, shape).astype(np.float32)
+        shape = (len(observation), self.n_commands)
+        commands = self.random.uniform(-self.largest, self.largest, shape)
+        return commands.astype(np.float32), state
 
 
 def yardsticks(task: BenchmarkTask) -> Mapping[str, Policy]:
@@ -51,7 +41,7 @@ def yardsticks(task: BenchmarkTask) -> Mapping[str, Policy]:
     """
     asked = task.task
     found: dict[str, Policy] = {
-        "zero action": ZeroAction(asked.n_commands),
+        "zero action": RandomActions(asked.n_commands, 0.0),
         "random actions": RandomActions(asked.n_commands),
     }
     if asked.definition.rule is not None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,9 +21,6 @@ from shipgym.errors import InputError, UnstableModelError
 from shipgym.models import ShipModel
 from shipgym.models.simulate import orders, simulate
 from shipgym.trials.trial import Trial
-
-if TYPE_CHECKING:
-    from agents.agent_file import Agent
 
 #: Share of the models drawn that an autopilot may lose control of.
 MOST_LOST = 0.05
@@ -47,12 +43,13 @@ class ClosedLoop:
     @property
     def counted(self) -> Flags:
         """Models that count, shape (n_draws,)."""
-        counted = np.ones(len(self.draws), dtype=np.bool_)
+        n_draws = len(self.draws)
+        counted = np.ones(n_draws, dtype=np.bool_)
         for number, possible in self.possible.items():
             counted[number] = possible
         return counted
 
-    def sail(self, autopilot: Agent) -> Episodes:
+    def sail(self, autopilot: Controller) -> Episodes:
         """An episode of each model under a heading autopilot."""
         return sail(autopilot, self.draws, judged_task(), self.seeds)
 
@@ -67,11 +64,6 @@ class ClosedLoop:
                 draw = self.draws[number]
                 self.possible[number] = is_possible(draw, self.trials)
 
-    def loses_too_many(self, lost: Flags) -> bool:
-        """Return True for a design that is not given; `lost`: shape (n_draws,)."""
-        self.look_at(lost)
-        return loses_too_many(lost, self.counted)
-
     def of_counted(self, track: Track) -> Track:
         """Track of the identified model and of the models that count."""
         counted = np.concatenate([[True], self.counted])
@@ -83,7 +75,7 @@ class ClosedLoop:
         )
 
 
-def loses_too_many(lost: Flags, counted: Flags, most_lost: float = MOST_LOST) -> bool:
+def loses_too_many(lost: Flags, counted: Flags) -> bool:
     """Return True if a design loses too many of the models that count.
 
     Where less than a quarter of the models counts, nothing is known.
@@ -91,7 +83,7 @@ def loses_too_many(lost: Flags, counted: Flags, most_lost: float = MOST_LOST) ->
     fewest = 0.25
     if np.mean(counted) < fewest:
         return True
-    return bool(np.mean(lost[counted]) > most_lost)
+    return bool(np.mean(lost[counted]) > MOST_LOST)
 
 
 def lost_tracks(track: Track) -> Flags:

@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 
-import shipgym
-from agents.controllers.controller import Controller
 from agents.verification.figures import criterion_name, in_words
 from agents.verification.result import STEP_DEG, AutopilotResult, Verification
 from identification import IdentificationResult
@@ -15,7 +13,7 @@ from identification.judging.warnings import held_out_error
 from identification.report.view import fit_view, trial_figures
 from shipgym.files import write_text
 from shipgym.manoeuvres import Criterion
-from shipgym.pages import NONE, number, render
+from shipgym.pages import number, render
 from shipgym.plots import panels
 
 #: Name and unit of each margin.
@@ -57,23 +55,11 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
         verdict_kind=kind,
         refusal=result.refusal,
         step_deg=STEP_DEG,
-        origin=_origin(result),
+        ship_file=result.ship.path.name,
         trials=result.trials,
         **data,
     )
     write_text(page, Path(path))
-
-
-def _origin(result: AutopilotResult) -> dict[str, str]:
-    """Where the model comes from, by what the page calls it."""
-    provenance = result.model.provenance or {}
-    keys = ("structure", "method", "samples")
-    own_version = f"shipgym {shipgym.__version__}"
-    return {
-        "software": provenance.get("software", own_version),
-        "ship file": result.ship.path.name,
-        ", ".join(keys): ", ".join([str(provenance.get(key, NONE)) for key in keys]),
-    }
 
 
 def verdict_of(result: AutopilotResult) -> tuple[str, str]:
@@ -128,6 +114,8 @@ def headline(found: Verification) -> str:
             f"{found.left_out} of the models run away whatever steers them, in the"
             " trials themselves or straight ahead, and do not count."
         )
+    if found.run_next:
+        sentences.append(f"Run next: {found.run_next}.")
     return " ".join(sentences)
 
 
@@ -155,21 +143,13 @@ def _criteria_sentences(criteria: Mapping[str, Criterion]) -> list[str]:
 
 def designs_of(found: Verification) -> dict[str, Any]:
     """Names and margins of the designs, for the tables of the page."""
-    designs: dict[str, Controller] = {}
-    learned = []
-    for pilot in found.by_name:
-        if pilot.design is None:
-            learned.append(pilot.name)
-        else:
-            designs[pilot.name] = pilot.design
     margins = []
     for field, words in MARGINS.items():
-        values = [getattr(design.margins, field) for design in designs.values()]
+        values = [getattr(one.controller.margins, field) for one in found.by_name]
         shown = ["∞" if value == np.inf else number(value) for value in values]
         margins.append((*words, shown))
     return {
-        "designs": list(designs),
-        "learned": learned,
+        "designs": [pilot.name for pilot in found.by_name],
         "margins": margins,
     }
 

@@ -1,12 +1,11 @@
 """Refusals: models that contradict their trials, and designs that lose control."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from agents.rollouts.course_keeping import Episodes
-from agents.verification.closed_loop import MOST_LOST, loses_too_many
+from agents.verification.closed_loop import loses_too_many
 from agents.verification.result import Verification
 from agents.verification.tracks import Track
 from identification.design.experiment import advise
@@ -47,78 +46,47 @@ def helpful_trial(fit: Fit) -> str:
     return f"a {advice.chosen[0]} to both sides"
 
 
-def simpler_structures(
-    ranking: Sequence[Mapping[str, Any]], structure: str
-) -> list[str]:
-    """The next best structures, two at most, with fewer coefficients than the chosen.
-
-    `ranking`: of `structure = "auto"`, as `Ranking.to_dict` has it. Where the trials
-    leave coefficients open, some of the models drawn run away whatever steers them.
-    """
-    own_counts = []
-    for fit in ranking:
-        if fit["structure"] == structure:
-            own_counts.append(fit["coefficients"])
-    fewest = min(own_counts, default=0)
-
-    simpler: dict[str, None] = {}  # each once, in the order of the ranking
-    for fit in ranking:
-        is_steady = fit["stable"] and not fit["ran_away"]
-        if is_steady and fit["coefficients"] < fewest:
-            simpler[fit["structure"]] = None
-    return list(simpler)[:2]
-
-
 class Refusals(NamedTuple):
     """Which designs are refused, and whether none is given."""
 
     by_design: dict[str, str]  # why, by the key of the autopilot
-    of_all: str | None  # why no autopilot is given; None where one is
+    of_all: str | None = None  # why no autopilot is given; None where one is
+    run_next: str = ""  # the trial that would help most
 
 
-def refused_designs(
-    found: Verification, fit: Fit, most_lost: float = MOST_LOST
-) -> Refusals:
+def refused_designs(found: Verification, fit: Fit) -> Refusals:
     """The designs that lose control of too many models drawn, and what would help."""
-    designed = [pilot for pilot in found.pilots if pilot.design is not None]
     lost = {}
-    for pilot in designed:
-        why = lost_control(found, pilot.episodes, most_lost)
+    for pilot in found.pilots:
+        why = lost_control(found, pilot.episodes)
         if why is not None:
             lost[pilot.key] = why
     tracks = {}
     for track in found.tracks:
-        why = lost_track(track, most_lost)
+        why = lost_track(track)
         if why is not None:
             tracks[track.key] = why
-    if not lost and not tracks:
-        return Refusals({}, None)
-
+    refused = lost | tracks
+    if not refused:
+        return Refusals(refused)
     remedy = helpful_trial(fit)
-    refused = {key: f"{why}; run {remedy}" for key, why in {**lost, **tracks}.items()}
-    if len(lost) < len(designed):
-        return Refusals(refused, None)
+    if len(lost) < len(found.pilots):
+        return Refusals(refused, run_next=remedy)
 
     for track in found.tracks:
         refused[track.key] = "what steers on its course loses control"
     names = ", ".join([key.upper() for key in lost])
-    of_first = refused[designed[0].key]
-    return Refusals(refused, f"{names}: {of_first}")
+    of_first = refused[found.pilots[0].key]
+    return Refusals(refused, f"{names}: {of_first}; run {remedy}")
 
 
-def lost_control(
-    found: Verification, episodes: Episodes, most_lost: float = MOST_LOST
-) -> str | None:
+def lost_control(found: Verification, episodes: Episodes) -> str | None:
     """Reason to refuse a design that loses too many models drawn, or None."""
-    terminated = episodes.terminated
-    counted = found.counted
-    if counted is None:
-        counted = np.ones(len(terminated), dtype=np.bool_)
-    if not loses_too_many(terminated, counted, most_lost):
+    if not loses_too_many(episodes.terminated, found.counted):
         return None
 
-    lost = np.flatnonzero(terminated & counted)
-    n_counted = int(np.sum(counted))
+    lost = np.flatnonzero(episodes.terminated & found.counted)
+    n_counted = int(np.sum(found.counted))
     why = f"it loses control of {len(lost)} of {n_counted} models drawn"
     if len(lost):
         median_s = float(np.median(episodes.duration_s[lost]))
@@ -128,15 +96,14 @@ def lost_control(
     return why
 
 
-def lost_track(track: Track, most_lost: float = MOST_LOST) -> str | None:
+def lost_track(track: Track) -> str | None:
     """Reason to refuse a guide that does not reach the end of the track, or None."""
     if not track.arrived[0]:
         return "it does not reach the end of the track on the identified model"
-    arrived = track.arrived[1:]
-    lost = int(np.sum(~arrived))
-    if not len(arrived) or lost <= most_lost * len(arrived):
+    lost = ~track.arrived[1:]
+    if not len(lost) or not loses_too_many(lost, np.ones_like(lost)):
         return None
     return (
-        f"it does not reach the end of the track with {lost} of {len(arrived)} models"
-        " drawn"
+        f"it does not reach the end of the track with {int(lost.sum())} of {len(lost)}"
+        " models drawn"
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,10 +22,6 @@ from shipgym.plots import Panel, draw
 from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial
 
-if TYPE_CHECKING:
-    from agents.agent_file import Agent
-
-
 STEP_DEG = 20.0
 
 
@@ -33,10 +29,8 @@ STEP_DEG = 20.0
 class Pilot:
     """One autopilot and what it costs over the models drawn."""
 
-    # its name in metrics, no other's: that of the controller, with a number where there
-    # are several
-    key: str
-    controller: Agent  # with gains and margins if it is a Controller
+    key: str  # its kind, the name in metrics
+    controller: Controller
     episodes: Episodes  # one episode on each model drawn
     # of the identified model, first, and of the stable models drawn
     step: StepResponses
@@ -45,11 +39,6 @@ class Pilot:
     def name(self) -> str:
         """Short name, in capitals as the field writes it."""
         return self.key.upper()
-
-    @property
-    def design(self) -> Controller | None:
-        """The controller, if it is one that was designed: with gains and margins."""
-        return self.controller if isinstance(self.controller, Controller) else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,15 +57,16 @@ class Verification:
     pilots: tuple[Pilot, ...]  # ranked: fewest lost, then the lowest median cost
     #: autopilots that could not be designed on the model, and why
     refused: dict[str, str]
-    tracks: tuple[Track, ...] = ()  # of autopilots that keep to a track
     #: draws that count against a design: the others run away whatever steers them,
-    #: shape (n_draws,); None for all
-    counted: Flags | None = None
+    #: shape (n_draws,)
+    counted: Flags
+    tracks: tuple[Track, ...] = ()  # of autopilots that keep to a track
+    run_next: str = ""  # the trials that would help most, in words
 
     @property
     def left_out(self) -> int:
         """Number of draws that do not count."""
-        return 0 if self.counted is None else int(np.sum(~self.counted))
+        return int(np.sum(~self.counted))
 
     @property
     def by_name(self) -> list[Pilot]:
@@ -174,6 +164,7 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
         "controllers": {pilot.key: pilot_metrics(pilot) for pilot in found.pilots},
         "ranking": [pilot.key for pilot in found.pilots],
         "refused": found.refused,
+        "run_next": found.run_next,
         "tracks": {track.key: track_metrics(track) for track in found.tracks},
     }
 
@@ -197,23 +188,13 @@ def track_metrics(track: Track) -> dict[str, Any]:
 
 
 def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
-    """Gains and margins of one autopilot, and its episodes over the models drawn.
-
-    Gains and margins are null if it is learned.
-    """
-    gains = None
-    margins = None
-    design = pilot.design
-    if design is not None:
-        gains = _floats(design.gains)
-        margins = _finite(asdict(design.margins))
-
+    """Gains and margins of one autopilot, and its episodes over the models drawn."""
     episodes = pilot.episodes
     rmse_deg = episodes.heading_rmse_deg
     travel_deg_min = episodes.rudder_travel_deg_min
     return {
-        "gains": gains,
-        "margins": margins,
+        "gains": _floats(pilot.controller.gains),
+        "margins": _finite(asdict(pilot.controller.margins)),
         "cost_mean": float(np.mean(episodes.cost)),
         "cost_median": float(np.median(episodes.cost)),
         "cost_quantile_95": upper_95(episodes.cost),

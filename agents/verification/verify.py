@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,9 +26,6 @@ from shipgym.models import ShipModel
 from shipgym.models.linear import is_course_stable, nomoto
 from shipgym.trials.trial import Trial
 
-if TYPE_CHECKING:
-    from agents.agent_file import Agent
-
 DESIGNS = ("pid", "lq", "preview-lq")
 
 
@@ -38,7 +34,6 @@ def verify(
     draws: int,
     seed: int,
     tell: Progress = lambda *_: None,
-    guests: Sequence[Agent] = (),
     designs: Sequence[str] = DESIGNS,
     trials: Sequence[Trial] = (),
 ) -> Verification:
@@ -46,9 +41,8 @@ def verify(
 
     `model`: with a covariance;
     `draws`, `seed`, `designs`: see `build_autopilot`; `tell`: called with the
-    progress; `guests`: further autopilots; `trials`: that the ship was put through: a
-    model drawn that runs away in one of them does not count. Raises InputError if no
-    autopilot can be designed on it.
+    progress; `trials`: that the ship was put through: a model drawn that runs away in
+    one of them does not count. Raises InputError if no autopilot can be designed on it.
     """
     tell("models drawn", 0, draws)
     designed = design_autopilots(model, designs)
@@ -65,7 +59,7 @@ def verify(
     tracks = [loop.led(guide) for guide in designed.guides]
     for track in tracks:
         loop.look_at(lost_tracks(track))
-    steered = sailed(loop, designed.controllers, guests)
+    steered = sailed(loop, designed.controllers)
     pilots = run_pilots(steered, [model, *stable], tell)
     return Verification(
         draws=draws,
@@ -97,15 +91,15 @@ def ran_away(criteria: Mapping[str, Criterion]) -> Flags:
 
 
 def sailed(
-    loop: ClosedLoop, designed: Sequence[Controller], guests: Sequence[Agent]
-) -> list[tuple[Agent, Episodes]]:
-    """Autopilots with their episodes; a draw counts by those of designs, not guests."""
-    found: list[tuple[Agent, Episodes]] = []
+    loop: ClosedLoop, designed: Sequence[Controller]
+) -> list[tuple[Controller, Episodes]]:
+    """Autopilots with their episodes, by which draws count or do not."""
+    found = []
     for pilot in designed:
         episodes = loop.sail(pilot)
         loop.look_at(episodes.terminated)
         found.append((pilot, episodes))
-    return found + [(guest, loop.sail(guest)) for guest in guests]
+    return found
 
 
 def keeps_course(model: ShipModel) -> bool:
@@ -117,18 +111,17 @@ def keeps_course(model: ShipModel) -> bool:
 
 
 def run_pilots(
-    steered: Sequence[tuple[Agent, Episodes]],
+    steered: Sequence[tuple[Controller, Episodes]],
     ships: Sequence[ShipModel],
     tell: Progress,
 ) -> list[Pilot]:
     """Autopilots with the episodes of each and its step responses on ships."""
     n = len(steered)
-    keys = unique_keys([str(autopilot.name) for autopilot, _ in steered])
     pilots = []
     for i, (autopilot, episodes) in enumerate(steered):
         tell("step responses", i, n)
         step = step_response(autopilot, ships, STEP_DEG)
-        pilots.append(Pilot(keys[i], autopilot, episodes, step))
+        pilots.append(Pilot(autopilot.kind, autopilot, episodes, step))
     tell("step responses", n, n)
     return pilots
 
@@ -173,14 +166,3 @@ def design_autopilots(model: ShipModel, designs: Sequence[str]) -> Designed:
             f"no autopilot that keeps a heading could be designed on it: {why}"
         )
     return found
-
-
-def unique_keys(names: Sequence[str]) -> list[str]:
-    """Names, those that were there before with a number."""
-    times: Counter[str] = Counter()
-    keys = []
-    for name in names:
-        times[name] += 1
-        number = times[name]
-        keys.append(name if number == 1 else f"{name}-{number}")
-    return keys

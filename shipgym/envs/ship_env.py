@@ -106,8 +106,10 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         self._shape = self._command.shape
         self._episode_cost = engine._row("episode_cost")[0]
         self._advance = engine.step_of_one()
+        self._uncounted = 1  # ship steps, which `Engine.advance` counts itself
         if self._paced is not None:
             self._advance = self._paced.advance
+            self._uncounted = 0
 
     @property
     def waypoints(self) -> Floats | None:
@@ -182,6 +184,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         if self._over or not self._begun:
             self._refuse_step()
         self._order(action)
+        Engine.ship_steps += self._uncounted
         if self._advance() == REFUSED:
             raise unexpected(
                 "action",

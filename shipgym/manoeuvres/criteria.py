@@ -221,7 +221,7 @@ class Criterion:
 
     @property
     def note(self) -> str:
-        """Remarks: why there is no verdict, and which trials would decide."""
+        """Remarks, such as why there is no verdict."""
         if self.contradicted:
             return (
                 "the model is at fault: its 95 % interval excludes the measured"
@@ -229,13 +229,7 @@ class Criterion:
             )
         if self.decided or not self.sides:
             return self.remark if self.measured is None else ""
-        note = f"not decided by these trials: {_why_undecided(self)}"
-        trials = self.deciding_trials
-        if len(trials) == 1:
-            note += f"; run a {trials[0]}"
-        elif trials:
-            note += f"; run a {self.manoeuvre} to both sides"
-        return note
+        return f"not decided by these trials: {_why_undecided(self)}"
 
     @property
     def contradicted(self) -> bool:
@@ -304,6 +298,17 @@ class Assessment(dict[str, Criterion]):
         """A line for each criterion."""
         lines = [f"{name}: {criterion}" for name, criterion in self.items()]
         return "\n".join(lines)
+
+
+def trials_to_run(criteria: Mapping[str, Criterion]) -> str:
+    """The trials that would decide all criteria, in words; empty if none would."""
+    wanted = {}
+    for criterion in criteria.values():
+        trials = criterion.deciding_trials
+        if trials:
+            to_both = f"{criterion.manoeuvre} to both sides"
+            wanted[criterion.manoeuvre] = trials[0] if len(trials) == 1 else to_both
+    return ", ".join(wanted.values())
 
 
 def _value_or_worse(side: Side) -> float:

@@ -16,9 +16,9 @@ environment = "path-following"
 model = "mariner-tls-svm"
 ship = "mariner"
 options = { episode_steps = 60, n_legs = 2 }
-far = { gear = { time_constant = 8.0 } }
+sweep = [{ gear = { time_constant = 8.0 } }, { noise = 2.0 }]
 """
-SETS = ["ship", "fresh", "model", "far"]  # of the task "turns"
+SETS = ["ship", "fresh", "model", "sweep-1", "sweep-2"]  # of the task "turns"
 
 
 def write_suite(folder, text=TEXT, **kept):

@@ -4,16 +4,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents import LQ, IntegralLineOfSight, sail
-from agents.cli.tables import ranking_table
 from agents.verification.chain import build_autopilot, verify
-from agents.verification.page import write_report
 from agents.verification.result import verification_metrics
 from agents.verification.tracks import keep_track
 from identification import identify
 from identification.judging.warnings import model_warnings
 from shipgym import InputError, ShipFile, load_model
-from tests.agents.policies import random_policy
 
 
 def test_the_folder_holds_report_model_metrics_and_all_autopilots(chain):
@@ -85,62 +81,6 @@ def test_only_what_is_asked_for_is_designed_and_a_path_autopilot_alone_is_refuse
 def test_the_saved_model_is_the_identified_one(chain):
     folder, result, _ = chain
     assert load_model(folder / "model.json").coefficients == result.model.coefficients
-
-
-def test_a_learned_guest_flies_beside_them_without_gains_and_margins(chain, tmp_path):
-    result = chain[1]
-    guest = random_policy(
-        result.model, base=LQ.from_model(result.model), authority=0.01
-    )
-    found = verify(result.model, 24, 1, guests=[guest])
-    told = verification_metrics(found)["controllers"]
-    alone = sail(guest, result.model.sample(24, 1), seeds=1 + np.arange(24))
-    assert told["learned"]["cost_mean"] == pytest.approx(alone.cost.mean(), rel=1e-6)
-    assert told["learned"]["gains"] is told["learned"]["margins"] is None
-    assert told["lq"] == verification_metrics(result.verification)["controllers"]["lq"]
-    write_report(replace(result, verification=found), tmp_path / "report.html")
-    assert (
-        "Trained earlier, on another model, and used unchanged: LEARNED."
-        in (tmp_path / "report.html").read_text()
-    )
-    table = ranking_table(replace(result, verification=found))
-    gain_margins = table.columns[6].cells
-    rows = dict(zip(table.columns[0].cells, gain_margins, strict=True))
-    assert rows["LEARNED"] == "-"
-    assert float(rows["LQ"]) > 1.0
-
-
-@pytest.mark.parametrize("made_for", ["paths", "another ship"])
-def test_a_guest_of_another_environment_or_ship_is_wrong_input(
-    demo, tmp_path, made_for
-):
-    path = tmp_path / "guest.json"
-    if made_for == "paths":
-        IntegralLineOfSight.from_model(
-            load_model("mariner"), autopilot=LQ.from_model(load_model("mariner"))
-        ).save(path)
-    else:
-        random_policy(load_model("kvlcc2")).save(path)
-    said = (
-        "cross_track.*for paths there is"
-        if made_for == "paths"
-        else "scale of '.*': expected"
-    )
-    with pytest.raises(InputError, match=f"agent '.*guest.json': .*{said}"):
-        build_autopilot(demo, tmp_path / "out", draws=4, agents=[path])
-    assert not (tmp_path / "out").exists()
-
-
-def test_an_unknown_guest_is_refused_with_the_nearest_name(tmp_path):
-    expected = (
-        "agent: expected a file, or one of .*'path-folowing-ppo'. Did you mean"
-        " 'path-following-ppo'"
-    )
-    with pytest.raises(InputError, match=expected):
-        build_autopilot(
-            "examples/mariner/ship.toml", tmp_path / "out", agents=["path-folowing-ppo"]
-        )
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_progress_is_told_to_the_end(chain):

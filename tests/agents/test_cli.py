@@ -260,7 +260,6 @@ def test_what_trials_cannot_use_exits_with_2(words, message, tmp_path, monkeypat
         ("trials ship.toml", "ship file", "look, identify"),
         ("trials pid.json", "controller file", "export"),
         ("export zigzag_15_15.csv --c c", "log", "new-ship"),
-        ("autopilot ship.toml --agent model.json --out out", "model file", "trials"),
         ("replay pid.json --out out.html", "controller file", "export"),
         ("look model.json --out out.html", "model file", "trials"),
         ("benchmark --controllers model.json --out out", "model file", "trials"),

@@ -53,7 +53,7 @@ LINES = (
     ("trials linear/model.json --draws 2 --seed 1 --out trials.html", 0),
     ("trials tanker --draws 0 --depth 25", 0),
     (
-        f"autopilot ship.toml {LINEAR} --draws 2 --seed 1 --agent pid.json --autopilots"
+        f"autopilot ship.toml {LINEAR} --draws 2 --seed 1 --autopilots"
         " lq,ilos --out report",
         0,
     ),
@@ -71,7 +71,7 @@ LINES = (
     (f"tune ppo {TASK} --model mariner --out study2", 2),
     (
         "benchmark --controllers pid,lq --suite small.toml --tasks calm --episodes 2"
-        " --workers 1 --engine local --page --allow-code reward.py --seed 1 --runs 2"
+        " --workers 1 --engine local --page --allow-code --seed 1 --runs 2"
         " --out results",
         0,
     ),

@@ -1,16 +1,17 @@
-"""A rule that steers the encounters."""
+"""The rules of the suite's tasks in which learning may pay."""
 
 import numpy as np
-from encounter_rule import factory
 
 from agents import rollout
-from agents.suites.suite import BenchmarkTask
+from agents.benchmarking.entries import Entry
+from agents.suites.suite import load_suite
 
 
 def test_the_rule_arrives_at_the_cost_that_the_page_says():
-    task = BenchmarkTask("encounter", "encounter", "container-two-zigzags")
+    task = load_suite().task("encounter")
     engine = task.engine(12)
-    sailed = rollout(factory(task), engine, task.seeds[:12], record=["reward_end"])
+    (policy,) = Entry("rule", "rule").made(task).policies
+    sailed = rollout(policy, engine, task.seeds[:12], record=["reward_end"])
     is_lost = (sailed.histories["reward_end"][1:] < 0.0) & sailed.sailing
     assert sailed.terminated.all()
     assert not is_lost.any()

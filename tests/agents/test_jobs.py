@@ -165,19 +165,6 @@ def test_the_error_of_a_job_names_it(workers, functions, tmp_path):
     assert "return 1 / job" in "".join(lines)
 
 
-@pytest.mark.parametrize(
-    ("function", "job", "message"),
-    [
-        (lambda job: job, {}, "function: expected a function at the top level"),
-        (os.path.join, {"k": object()}, r"jobs\[0\]: expected a dict of finite"),
-        (os.path.join, 3, r"jobs\[0\]: expected a dict .*, got 3"),
-    ],
-)
-def test_wrong_jobs_are_refused(function, job, message):
-    with pytest.raises(InputError, match=message):
-        run_jobs(function, [job])
-
-
 def test_wrong_engines_are_refused():
     with pytest.raises(InputError, match=r"engine: .*Did you mean 'ray'"):
         JobEngine("rai")

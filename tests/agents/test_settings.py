@@ -81,7 +81,7 @@ def test_domain_randomisation_draws_ships_where_a_model_has_a_covariance():
 
 def test_agents_of_a_suite_learn_over_drawn_models_and_never_see_the_true_ship():
     plan = make_plan("ppo", task="roll-limit")
-    assert (plan.task.true_ship, plan.task.far) == ("", {})
+    assert (plan.task.true_ship, plan.task.sweep) == ("", ())
     own = {"model_uncertainty": "covariance", "bounded": False}
     assert training_options(plan) == {**plan.task.options, **own}
 

@@ -111,7 +111,7 @@ def test_the_file_is_the_policy_of_the_lowest_cost_held_out(tmp_path):
     assert agent.training["cost"] == result.best["cost"]
     progress = json.loads((run / "progress.json").read_text())
     assert progress == {"yardsticks": result.yardsticks, "curve": list(result.curve)}
-    assert json.loads((run / "run.json").read_text())["command"] == "train()"
+    assert "torch" in json.loads((run / "run.json").read_text())["versions"]
     assert result.curve[0]["mean_return"] is None
     assert all(row["mean_return"] < 0.0 for row in result.curve[1:])
 

@@ -82,7 +82,9 @@ def test_folder_of_something_else_is_refused(tmp_path, monkeypatch):
     tune(plan(), study, 1)
     with pytest.raises(InputError, match=r"settings\.gamma: expected 0\.99, got 0\.9"):
         tune(plan(gamma=0.9), study, 1)
-    with pytest.raises(InputError, match="exists and is not a tuning study"):
+    with pytest.raises(
+        InputError, match="expected results of this command or nothing, got 'study'"
+    ):
         tune(plan(), tmp_path, 1)
     with pytest.raises(InputError, match="trials: expected an integer of at least 1"):
         tune(plan(), tmp_path / "none", 0)
@@ -98,6 +100,5 @@ def test_the_command_tunes_and_goes_on_with_a_study(tmp_path):
     words += ["--seed", "7", "--out", str(tmp_path / "study"), "--json", "--trials"]
     for trials in (1, 2):
         told = json.loads(CliRunner().invoke(app, [*words, str(trials)]).stdout)
-        assert told["trials"][0]["ended"] == "complete"
-        assert len(told["trials"]) == trials
+        assert told["trials"] == trials
     assert told["settings"] == str(tmp_path / "study" / "best.toml")
