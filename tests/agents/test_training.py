@@ -197,7 +197,7 @@ def test_the_command_trains_and_resumes(tmp_path):
     assert told["configuration"] == written["configuration"]
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
     for more, expected in (
-        ([], "--resume, or name another folder"),
+        ([], "continue with --resume"),
         (["--resume", "--set", "gamma=0.5"], "gamma: expected 0.99, got 0.5"),
         (["--resume", "--seed", "3"], "seed: expected 0, got 3"),
         (["--resume", "--model", "kvlcc2"], "expected 'mariner', got 'kvlcc2'"),
