@@ -5,15 +5,18 @@ import math
 import reprlib
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import MISSING, field, fields
 from numbers import Integral, Real
 from operator import ge, gt, le, lt
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.errors import InputError
+
+Kind = TypeVar("Kind")
 
 _COMPARED = {">": gt, ">=": ge, "<": lt, "<=": le}
 _SHORT = reprlib.Repr()
@@ -220,6 +223,36 @@ def check_whole(
     raise unexpected(where, expected, value)
 
 
+def bounded(default: Any = MISSING, **bounds: Any) -> Any:
+    """Field of a dataclass that is a number within bounds, as `check_number` has them.
+
+    With a default of None it may be unknown.
+    """
+    return field(default=default, metadata={"bounds": bounds})
+
+
+def keep_numbers(part: Any, where: str = "") -> None:
+    """Make floats of the `bounded` fields of a dataclass, which must be in bounds."""
+    for one in fields(part):
+        value = getattr(part, one.name)
+        unknown = value is None and one.default is None
+        if "bounds" in one.metadata and not unknown:
+            number = check_number(value, where + one.name, **one.metadata["bounds"])
+            object.__setattr__(part, one.name, number)
+
+
+def read_fields(kind: type[Kind], content: Any, where: str) -> Kind:
+    """Make a dataclass of a table; an unknown or a missing field is refused."""
+    known: Any = fields(kind)  # type: ignore[arg-type]
+    table = check_table(
+        content,
+        where,
+        allowed=[one.name for one in known],
+        required=[one.name for one in known if one.default is MISSING],
+    )
+    return kind(**table)
+
+
 def check_flag(value: Any, where: str) -> bool:
     """Return `value`, which must be a boolean."""
     if not isinstance(value, bool):
@@ -244,6 +277,17 @@ def check_finite(values: Any, where: str, hint: str = "") -> NDArray[np.float64]
         )
     array.setflags(write=False)
     return array
+
+
+def check_arrays(
+    content: Any, shapes: Mapping[str, tuple[int | None, ...]], where: str
+) -> dict[str, NDArray[np.float64]]:
+    """Return the arrays of a table by name, each of its shape (`check_array`)."""
+    table = check_table(content, where, shapes)
+    return {
+        name: check_array(table.get(name), shape, f"{where}.{name}")
+        for name, shape in shapes.items()
+    }
 
 
 def check_array(

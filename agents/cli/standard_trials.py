@@ -4,9 +4,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from shipgym.arrays import finite
 from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 from shipgym.manoeuvres import Criterion, IndexInterval, Manoeuvre
 from shipgym.manoeuvres.imo import imo_criteria
@@ -29,14 +26,11 @@ class StandardTrials:
     indices : dict
         Indices by manoeuvre and name, units in the names.
     criteria : dict
-        Criteria of IMO resolution MSC.137(76); none in shallow water, which they are
-        not made for.
+        Criteria of IMO resolution MSC.137(76).
     refused : dict
         Why a manoeuvre could not be simulated, or has no indices.
     draws : int
         Number of models drawn.
-    water_depth : float
-        Water depth, m.
     """
 
     families: dict[str, dict[str, Manoeuvre]]
@@ -45,26 +39,18 @@ class StandardTrials:
     criteria: dict[str, Criterion]
     refused: dict[str, str]
     draws: int
-    water_depth: float = np.inf
-
-    @property
-    def water(self) -> str:
-        """The water depth in words."""
-        if np.isinf(self.water_depth):
-            return "deep water"
-        return f"water of {self.water_depth:g} m"
 
     def to_dict(self) -> dict[str, Any]:
         """The content for `--json`."""
         manoeuvres = {}
         for name, indices in self.indices.items():
             manoeuvres[name] = {key: index.to_dict() for key, index in indices.items()}
+        criteria = {name: one.to_dict() for name, one in self.criteria.items()}
         return {
             "draws": self.draws,
-            "water_depth": finite(self.water_depth),
             "manoeuvres": manoeuvres,
             "refused": self.refused,
-            "imo": {name: one.to_dict() for name, one in self.criteria.items()},
+            "imo": criteria,
         }
 
 
@@ -73,12 +59,10 @@ def standard_trials(
     draws: int = 0,
     seed: int = 0,
     progress: Callable[[int], None] | None = None,
-    water_depth: float = np.inf,
 ) -> StandardTrials:
     """Simulate the standard manoeuvres of a ship, with its model and with draws of it.
 
     A manoeuvre that cannot be simulated, or has no indices, is in `refused`. Raises
-    InputError for water too shallow, or for a ship without shallow-water equations;
     UnstableModelError if the model runs away in every manoeuvre.
 
     Parameters
@@ -91,10 +75,8 @@ def standard_trials(
         Seed of the draws.
     progress : callable, optional
         Called with the number of draws done.
-    water_depth : float
-        Water depth, m.
     """
-    families = families_of(model, water_depth)
+    families = families_of(model)
     manoeuvres: dict[str, Manoeuvre] = {}
     for family in families.values():
         manoeuvres |= family
@@ -109,10 +91,9 @@ def standard_trials(
         families=families,
         runs=nominal.runs,
         indices=indices,
-        criteria=imo_criteria(model, indices) if np.isinf(water_depth) else {},
+        criteria=imo_criteria(model, indices),
         refused=nominal.refused,
         draws=len(drawn),
-        water_depth=water_depth,
     )
 
 

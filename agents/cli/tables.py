@@ -106,12 +106,10 @@ def selection_table(ranking: Mapping[str, Any]) -> Table:
     return table
 
 
-def manoeuvre_table(
-    rows: Mapping[str, Mapping[str, IndexInterval]], water: str = "deep water"
-) -> Table:
+def manoeuvre_table(rows: Mapping[str, Mapping[str, IndexInterval]]) -> Table:
     """Indices of manoeuvres, one line each, with the intervals of models drawn."""
     table = plain_table(
-        f"Manoeuvres from service speed in {water}",
+        "Manoeuvres from service speed in deep water",
         "manoeuvre",
         "index",
         ">value",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -26,9 +25,6 @@ def trials_command(
         int, Option(min=0, help="Models drawn from an identified model's covariance.")
     ] = DRAWS,
     seed: Annotated[int, Option(min=0, help="Random seed of the draws.")] = 0,
-    depth: Annotated[
-        float | None, Option(metavar="M", help="Water depth, m; default: deep.")
-    ] = None,
 ) -> None:
     """Simulate the standard manoeuvres of a model. Assesses them by the IMO criteria.
 
@@ -42,8 +38,6 @@ def trials_command(
     from shipgym.models import load_model
 
     ship = load_model(model)
-    water_depth = inf if depth is None else depth
-    ship.check_depth(water_depth)
     if out is not None:
         check_page(out, plots=True)
 
@@ -52,7 +46,7 @@ def trials_command(
         def on_progress(done: int) -> None:
             bars("models drawn", done, draws)
 
-        trials = standard_trials(ship, draws, seed, on_progress, water_depth)
+        trials = standard_trials(ship, draws, seed, on_progress)
 
     if out is not None:
         write_page(ship, trials, out)
@@ -66,15 +60,11 @@ def _print_trials(trials: StandardTrials, page: Path | None) -> None:
     from agents.cli.terminal import console, say, warn
     from shipgym.manoeuvres.criteria import trials_to_run
 
-    console.print(manoeuvre_table(trials.indices, trials.water))
+    indices = manoeuvre_table(trials.indices)
+    criteria = criteria_table(trials.criteria)
+    console.print(indices)
     console.print()
-    if trials.criteria:
-        console.print(criteria_table(trials.criteria))
-    else:
-        say(
-            "The IMO criteria are made for deep water: leave --depth out to assess"
-            " them."
-        )
+    console.print(criteria)
     say(*criteria_notes(trials.criteria))
     if run_next := trials_to_run(trials.criteria):
         say(f"run next: {run_next}")

@@ -24,7 +24,6 @@ def write_page(model: ShipModel, trials: StandardTrials, path: Path) -> None:
     page = render(
         "agents.cli/trials.html",
         model=model,
-        water=trials.water,
         draws=trials.draws,
         criteria=in_words(trials.criteria),
         sections=sections,

@@ -171,11 +171,8 @@ class Criterion:
 
     @property
     def side(self) -> str:
-        """The worse side: of the trials, without any of the model."""
-        if self.worse_measured is not None:
-            return self.worse_measured.side
-        worst_side = max(self.sides, key=_value_or_worse, default=None)
-        return "" if worst_side is None else worst_side.name
+        """Side of the worse trial; empty without any."""
+        return "" if self.worse_measured is None else self.worse_measured.side
 
     @cached_property
     def _chances(self) -> Chances:
@@ -209,7 +206,8 @@ class Criterion:
         found = f"{self.drawn}"
         if measured is not None:
             found += f", measured {measured}"
-        return f"{found}; limit {self.limit:.4g} {self.unit}: {self.verdict}"
+        limit = f"limit {self.limit:.4g} {self.unit}"
+        return f"{found}; {limit}: {self.verdict}"
 
     @property
     def deciding_trials(self) -> tuple[str, ...]:
@@ -228,7 +226,7 @@ class Criterion:
                 f" {self.measured:.3g} (standard error {self.measured_error:.2g})"
             )
         if self.decided or not self.sides:
-            return self.remark if self.measured is None else ""
+            return self.remark
         return f"not decided by these trials: {_why_undecided(self)}"
 
     @property
@@ -254,17 +252,13 @@ class Criterion:
         return None if self.drawn is None else self.drawn.interval
 
     @property
-    def share_passed(self) -> float | None:
-        """Share of the draws that pass; runaways and incomplete runs do not."""
-        if self.drawn is None or not len(self.drawn.values):
-            return None
-        return float(np.mean(self.drawn.values <= self.limit))  # NaN is not
-
-    @property
     def probability(self) -> float | None:
         """Probability to pass, by trials and models drawn; None if undecided."""
-        by_value = self.measured is None and self.share_passed is None
-        if by_value or not self.decided:
+        if not self.decided or self.drawn is None:
+            return None
+        n_draws = len(self.drawn.values)
+        by_value = self.measured is None and not n_draws
+        if by_value:
             return None
         certainty = max(self._chances)
         return certainty if self.passed else 1.0 - certainty
@@ -309,11 +303,6 @@ def trials_to_run(criteria: Mapping[str, Criterion]) -> str:
             to_both = f"{criterion.manoeuvre} to both sides"
             wanted[criterion.manoeuvre] = trials[0] if len(trials) == 1 else to_both
     return ", ".join(wanted.values())
-
-
-def _value_or_worse(side: Side) -> float:
-    """Index of the model on a side; infinite where it has none."""
-    return np.inf if side.drawn.value is None else side.drawn.value
 
 
 def side_in_words(manoeuvre: str, side: str) -> str:

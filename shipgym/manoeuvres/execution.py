@@ -1,6 +1,5 @@
 """Time of execution of a manoeuvre, by the ordered or measured rudder."""
 
-from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -25,32 +24,17 @@ class Reversals(NamedTuple):
 
 def rudder(trial: Trial) -> Floats:
     """The ordered rudder where it was recorded, else the rudder itself, rad."""
-    for name in ("delta_command", "delta"):
-        if name in trial.channels:
-            return trial[name]
-    raise InputError(
-        f"trial {trial.name!r}: channel 'delta' is missing, it shows when the rudder"
-        " moved"
-    )
+    return trial["delta_command" if is_ordered(trial) else "delta"]
 
 
 def is_ordered(trial: Trial) -> bool:
     """Return whether a trial has the ordered rudder."""
-    return "delta_command" in trial.channels
+    return "delta_command" in trial
 
 
 def usual_rudder(trial: Trial) -> float:
     """Rudder angle that is held in a manoeuvre, regardless of the approach, rad."""
     return float(np.percentile(np.abs(rudder(trial)), 75))
-
-
-def require(trial: Trial, names: Sequence[str], what: str) -> None:
-    """Refuse a trial that lacks a channel that `what` needs."""
-    for name in names:
-        if name not in trial.channels:
-            raise InputError(
-                f"trial {trial.name!r}: channel {name!r} is missing, {what} needs it"
-            )
 
 
 def execute_time(trial: Trial) -> float:

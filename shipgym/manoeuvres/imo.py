@@ -81,21 +81,22 @@ def imo_criteria(
     and the draws are on one side of the limit, or by what these trials measured, which
     the model file has.
     """
-    outside = {}
-    for name, manoeuvre in imo_manoeuvres(model).items():
-        if name in found:
-            outside[name] = outside_envelope(model, manoeuvre)
-
+    outside = {
+        name: outside_envelope(model, manoeuvre)
+        for name, manoeuvre in imo_manoeuvres(model).items()
+        if name in found
+    }
     criteria = {}
     for criterion, rule in ship_rules(model).items():
         sides = []
-        for name in outside:
+        for name, is_outside in outside.items():
             if name.startswith(rule.manoeuvre):
                 side = "port" if "port" in name else "starboard"
+                indices = found[name]
                 known = Side(
                     name=side,
-                    drawn=found[name][rule.index],
-                    outside=outside[name],
+                    drawn=indices[rule.index],
+                    outside=is_outside,
                 )
                 sides.append(known)
         trial = trial_in_words(model, rule.manoeuvre)
@@ -111,12 +112,8 @@ def stopping_criterion(
 ) -> Criterion:
     """Full astern stopping test; no verdict for a ship that cannot go astern."""
     if stop is not None:
-        note = (
-            "where large displacement makes 15 lengths impracticable, the"
-            " Administration may allow up to 20"
-        )
         side = Side(name="", drawn=stop[STOPPING.index])
-        return Criterion(STOPPING, STOPPING.manoeuvre, (side,), note)
+        return Criterion(STOPPING, STOPPING.manoeuvre, (side,))
     why = "its equations hold for a shaft turning ahead only"
     if "n" not in model.command_names:
         why = (

@@ -9,7 +9,7 @@ import numpy as np
 from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
-from shipgym.manoeuvres.quantiles import DRAWS, LEVELS_95, quantiles
+from shipgym.manoeuvres.quantiles import DRAWS, LEVELS_95
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.standard import standard_manoeuvres
 from shipgym.models.by_name import takes_name
@@ -20,6 +20,9 @@ from shipgym.models.ship_model import ShipModel
 Evaluation = Callable[[ShipModel], Any]
 #: Indices of manoeuvres by manoeuvre and name; None where one was not completed.
 Indices = Mapping[str, Mapping[str, float | None]]
+
+#: Indices of a draw as far as it got, and whether it ran away.
+Outcome = tuple[dict[str, float | None], bool]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,16 +48,23 @@ class IndexInterval:
         interval where more than 2.5 per cent of the draws have none; so has one without
         draws.
         """
-        draws = len(self.values)
-        without = self.n_ran_away + self.n_never_reached
-        if not draws or not (self.is_size or without <= LEVELS_95[0] * draws):
+        known = self.values[~np.isnan(self.values)]
+        n_without = len(self.values) - len(known)
+        if not len(self.values):
             return None
-        low, high = self.quantiles(*LEVELS_95)
+        if not self.is_size and (
+            self.value is None or n_without > LEVELS_95[0] * len(self.values)
+        ):
+            return None
+        if self.is_size:
+            lost = np.full(n_without, np.inf)
+            known = np.concatenate([np.maximum(known, 0.0), lost])
+        with np.errstate(invalid="ignore"):  # between a value and infinity
+            low, high = np.quantile(known, LEVELS_95).tolist()
         if self.value is None:  # the model itself did not complete it
-            return None if low is None or not self.is_size else (low, None)
-        lower = self.value if low is None else min(low, self.value)
-        upper = None if high is None else max(high, self.value)
-        return lower, upper
+            return (low, None) if np.isfinite(low) else None
+        upper = max(high, self.value) if np.isfinite(high) else None
+        return float(np.fmin(low, self.value)), upper
 
     @property
     def n_ran_away(self) -> int:
@@ -66,18 +76,6 @@ class IndexInterval:
         """Draws that did not run away, but did not complete their manoeuvre."""
         without = np.isnan(self.values) & ~self.ran_away
         return int(without.sum())
-
-    def quantiles(self, *levels: float) -> tuple[float | None, ...]:
-        """Quantiles over the draws; None where there is no bound, or no draw.
-
-        Of a draw without value a size is larger than any; another index does not count.
-        """
-        without = np.isnan(self.values)
-        if not self.is_size:
-            return quantiles(self.values[~without], *levels)
-        sizes = np.maximum(self.values, 0.0)
-        sizes[without] = np.inf
-        return quantiles(sizes, *levels)
 
     def to_dict(self) -> dict[str, Any]:
         """Value, interval and counts, as JSON knows them."""
@@ -191,37 +189,32 @@ def intervals_of(
     manoeuvre. Without draws the values stand alone. `progress` is called with the
     number of draws done.
     """
-    found = {}
-    for name, indices in own.items():
-        found[name] = _without_draws(indices, len(draws))
-
-    for k, draw in enumerate(draws):
-        for name, intervals in found.items():
-            indices, ran_away = attempt(evaluations[name], draw)
-            for index, interval in intervals.items():
-                value = indices.get(index)
-                if value is not None:
-                    interval.values[k] = value
-                interval.ran_away[k] = ran_away
+    outcomes: dict[str, list[Outcome]] = {name: [] for name in own}
+    for done, draw in enumerate(draws, 1):
+        for name, found in outcomes.items():
+            found.append(attempt(evaluations[name], draw))
         if progress is not None:
-            progress(k + 1)
-    return found
+            progress(done)
+    intervals = {}
+    for name, indices in own.items():
+        drawn = outcomes[name]
+        intervals[name] = {
+            index: _interval(index, value, drawn) for index, value in indices.items()
+        }
+    return intervals
 
 
-def _without_draws(
-    indices: Mapping[str, float | None], count: int
-) -> dict[str, IndexInterval]:
-    """Intervals of a manoeuvre whose draws are still to be filled in."""
-    ran_away = np.zeros(count, dtype=np.bool_)
-    return {
-        index: IndexInterval(
-            value=value,
-            values=np.full(count, np.nan),
-            ran_away=ran_away,
-            is_size=is_size(index),
-        )
-        for index, value in indices.items()
-    }
+def _interval(
+    index: str, value: float | None, outcomes: Sequence[Outcome]
+) -> IndexInterval:
+    """One index over the outcomes of a manoeuvre."""
+    values = [indices.get(index) for indices, _ in outcomes]
+    return IndexInterval(
+        value=value,
+        values=np.array(values, dtype=float),  # None becomes NaN
+        ran_away=np.array([ran_away for _, ran_away in outcomes], dtype=bool),
+        is_size=is_size(index),
+    )
 
 
 def is_size(index: str) -> bool:
@@ -243,9 +236,7 @@ def is_size(index: str) -> bool:
     return index in sizes
 
 
-def attempt(
-    evaluate: Evaluation, model: ShipModel
-) -> tuple[dict[str, float | None], bool]:
+def attempt(evaluate: Evaluation, model: ShipModel) -> Outcome:
     """Indices of a manoeuvre as far as it got, and whether the ship ran away.
 
     A spiral of a draw that turns to one side only, or whose rudder has the wrong sign,

@@ -5,7 +5,7 @@ high. Source of the smoothing: Reinsch 1967, Smoothing by spline functions.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,14 @@ from scipy.interpolate import make_smoothing_spline
 from scipy.special import ndtr
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_number, check_table
+from shipgym.checks import (
+    bounded,
+    check_choice,
+    check_table,
+    keep_numbers,
+    placed,
+    read_fields,
+)
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import rudder, usual_rudder
 from shipgym.manoeuvres.imo_rules import RULES, Rule
@@ -31,12 +38,16 @@ from shipgym.trials.trial import Trial
 class MeasuredIndex:
     """An index that a trial measures."""
 
-    value: float  # ship lengths or degrees
-    error: float  # its standard error
-    side: str  # to which the rudder was ordered first, "starboard" or "port"
+    value: float = bounded()  # ship lengths or degrees
+    error: float = bounded(at_least=0.0)  # its standard error
+    side: str = ""  # to which the rudder was ordered first, "starboard" or "port"
     #: by the model with the trial's own rudder, which no helmsman moves as a standard
     #: manoeuvre has it
-    predicted: float | None = None
+    predicted: float | None = bounded(None)
+
+    def __post_init__(self) -> None:
+        keep_numbers(self)
+        check_choice(self.side, ("starboard", "port"), "side")
 
     def __str__(self) -> str:
         return f"{self.value:.2f}±{self.error:.2f} {self.side}"
@@ -73,20 +84,10 @@ def measured_in_file(model: ShipModel) -> list[tuple[str, MeasuredIndex]]:
     found = list[tuple[str, MeasuredIndex]]()
     for trial, indices in check_table(table, where, trials).items():
         for name, given in check_table(indices, f"{where} {trial}", RULES).items():
-            found.append((name, _read_index(given, f"{where} {trial} {name}")))
+            place = f"{where} {trial} {name}"
+            with placed(place, " "):
+                found.append((name, read_fields(MeasuredIndex, given, place)))
     return found
-
-
-def _read_index(given: object, where: str) -> MeasuredIndex:
-    known = [one.name for one in fields(MeasuredIndex)]
-    values = check_table(given, where, known, known[:3])
-    value = check_number(values["value"], f"{where} value")
-    error = check_number(values["error"], f"{where} error", at_least=0.0)
-    side = check_choice(values["side"], ("starboard", "port"), f"{where} side")
-    predicted = values.get("predicted")
-    if predicted is not None:
-        check_number(predicted, f"{where} predicted")
-    return MeasuredIndex(value, error, side, predicted)
 
 
 def measured_indices(

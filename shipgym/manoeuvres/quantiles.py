@@ -1,4 +1,4 @@
-"""Ends of 95 % intervals, of drawn values and of the normal distribution."""
+"""Ends of 95 % intervals of drawn values, and how many are drawn."""
 
 import numpy as np
 
@@ -8,20 +8,6 @@ from shipgym.arrays import Floats
 DRAWS = 200
 #: Shares of the draws below the lower and the upper end of the interval.
 LEVELS_95 = (0.025, 0.975)
-#: Standard deviations from the mean of a normal distribution to either end.
-NORMAL_95 = 1.96
-
-
-def quantiles(values: Floats, *levels: float) -> tuple[float | None, ...]:
-    """Quantiles of values, infinite ones at their end; None for one without bound.
-
-    None too without values.
-    """
-    if not values.size:
-        return (None,) * len(levels)
-    with np.errstate(invalid="ignore"):  # between a value and infinity
-        found = np.quantile(values, levels)
-    return tuple(end if np.isfinite(end) else None for end in found.tolist())
 
 
 def upper_95(values: Floats) -> float:

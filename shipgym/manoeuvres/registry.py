@@ -70,9 +70,8 @@ def check_physical(model: ShipModel, trial: Trial) -> None:
             )
 
 
-#: From a ship and the depth of the water in m to the manoeuvres of a family that suit
-#: her, by name.
-Variants = Callable[[ShipModel, float], Mapping[str, Manoeuvre]]
+#: From a ship to the manoeuvres of a family that suit her, by name.
+Variants = Callable[[ShipModel], Mapping[str, Manoeuvre]]
 
 
 @dataclass(frozen=True)
@@ -99,47 +98,27 @@ def register_manoeuvre(name: str, variants: Variants, title: str = "") -> None:
     name : str
         Of the family, such as ``"zigzags"``.
     variants : callable
-        From a ship and the depth of the water, m, to a dict of `Manoeuvre` by name;
-        empty for a ship that the manoeuvre does not suit. Angles and durations are
-        chosen for the ship there.
-    title : str
-        Heading on pages; by default the name.
+        From a ship to a dict of `Manoeuvre` by name; empty for a ship that the
+        manoeuvre does not suit. Angles and durations are chosen for the ship there.
     """
     check_text(name, "manoeuvre: name")
     if name in FAMILIES:
         raise InputError(
             f"manoeuvre: expected a new name, got '{name}', which is registered already"
         )
-    title = title or name.capitalize()
-    FAMILIES[name] = Family(title, variants)
+    FAMILIES[name] = Family(title or name.capitalize(), variants)
 
 
-def families_of(
-    model: ShipModel, water_depth: float = np.inf
-) -> dict[str, dict[str, Manoeuvre]]:
+def families_of(model: ShipModel) -> dict[str, dict[str, Manoeuvre]]:
     """Manoeuvres that suit a ship, by family and name; see `standard_manoeuvres`."""
-    model.check_depth(water_depth)
-    return {
-        name: dict(family.variants(model, water_depth))
-        for name, family in FAMILIES.items()
-    }
+    return {name: dict(one.variants(model)) for name, one in FAMILIES.items()}
 
 
 @takes_name
-def standard_manoeuvres(
-    model: ShipModel, water_depth: float = np.inf
-) -> dict[str, Manoeuvre]:
-    """Registered manoeuvres that suit a ship, from service speed.
+def standard_manoeuvres(model: ShipModel) -> dict[str, Manoeuvre]:
+    """Registered manoeuvres that suit a ship, from service speed in deep water.
 
-    Raises InputError for water that is too shallow, or for shallow water with a
-    deep-water model.
-
-    Parameters
-    ----------
-    model : ShipModel
-        Her length and speed give durations and steps, her rudder's limit the angles.
-    water_depth : float
-        m, for ships whose equations cover shallow water.
+    Her length and speed give durations and steps, her rudder's limit the angles.
 
     Returns
     -------
@@ -149,7 +128,7 @@ def standard_manoeuvres(
         registered besides (`register_manoeuvre`).
     """
     found = dict[str, Manoeuvre]()
-    for family in families_of(model, water_depth).values():
+    for family in families_of(model).values():
         found |= family
     return found
 

@@ -1,17 +1,16 @@
 """Stopping (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError, ManoeuvreError
-from shipgym.manoeuvres.execution import distance_sailed, require, ship_length
+from shipgym.manoeuvres.execution import distance_sailed, ship_length
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.models import ShipModel
 from shipgym.models.by_name import takes_name
-from shipgym.models.simulate import Passage, as_trial, orders
+from shipgym.models.simulate import simulate
 from shipgym.ships import ShipEquations
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
@@ -53,35 +52,19 @@ def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:
             f"model {model.name!r}: expected equations that hold for a shaft astern,"
             " got others; use a ship such as 'tanker'"
         )
-    n_steps = 40  # of a ship length
-    step = model.travel_time / n_steps
-    order = -model.service_shaft_speed
-    passage = Passage(model, step, water_depth)
-    held = np.tile([0.0, order], (n_steps, 1))
-    column = model.state_names.index("u")
-    states = passage.states(model.service_state, 0)
-    is_at_rest = False
-    longest = 300  # of a stopping trial, L / U0
-    while not is_at_rest and len(states) <= longest * n_steps:
-        sailed = step * (len(states) - 1)
-        length = passage.states(states[-1], n_steps)
-        passage.run("simulate", length, held, step, since=sailed)
-        at_rest = length[1:, column] <= 0.0
-        is_at_rest = bool(at_rest.any())
-        last = at_rest.argmax() + 2 if is_at_rest else n_steps + 1
-        states = np.concatenate([states, length[1:last]])
-
-    rudder = np.zeros(len(states))
-    shaft = np.full(len(states), order)
-    commands = orders(model, rudder, shaft)
-    trial = as_trial(model, step, states, commands, "straight")
-    if is_at_rest:
-        return trial
-    raise ManoeuvreError(
-        f"crash stop of {model.name!r}: expected a ship at rest, got"
-        f" {trial['u'][-1]:.3g} m/s after {trial.duration:.0f} s",
-        trial,
-    )
+    step = model.travel_time / 40
+    longest = 300 * 40  # steps
+    order = [0.0, -model.service_shaft_speed]
+    trial = simulate(model, np.tile(order, (longest, 1)), step, water_depth=water_depth)
+    at_rest = np.flatnonzero(trial["u"] <= 0.0)
+    if not at_rest.size:
+        raise ManoeuvreError(
+            f"crash stop of {model.name!r}: expected a ship at rest, got"
+            f" {trial['u'][-1]:.3g} m/s after {trial.duration:.0f} s",
+            trial,
+        )
+    rows = slice(at_rest[0] + 1)
+    return trial.part(rows).with_(kind="straight", length=trial.length)
 
 
 def stopping_indices(trial: Trial) -> StoppingIndices:
@@ -90,7 +73,6 @@ def stopping_indices(trial: Trial) -> StoppingIndices:
     The trial has u, v, x, y and psi, and the ship's length. Raises InputError if a
     channel or the length is missing.
     """
-    require(trial, ("u", "v", "x", "y", "psi"), "a stopping trial")
     lpp = ship_length(trial)
     psi = trial["psi"]
 
@@ -109,15 +91,13 @@ def stopping_indices(trial: Trial) -> StoppingIndices:
     )
 
 
-def standard_stops(
-    model: ShipModel, water_depth: float = np.inf
-) -> dict[str, Manoeuvre]:
+def standard_stops(model: ShipModel) -> dict[str, Manoeuvre]:
     """The crash stop, if the shaft reverses."""
     if not goes_astern(model):
         return {}
     return {
         "crash stop": Manoeuvre(
-            partial(crash_stop, water_depth=water_depth),
+            crash_stop,
             stopping_indices,
             StoppingIndices,
             "The shaft ordered full astern at service speed, the rudder amidships,"

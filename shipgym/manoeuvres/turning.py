@@ -12,7 +12,6 @@ from shipgym.manoeuvres.execution import (
     execute_time,
     number_of_steps,
     reached,
-    require,
     ship_length,
 )
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
@@ -86,7 +85,6 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
     between perpendiculars, m, by default the trial's own. Raises InputError if a
     channel or the length is missing.
     """
-    require(trial, ("x", "y", "psi"), "a turning circle")
     lpp = ship_length(trial, length)
     start = execute_time(trial)
     after = trial.t >= start
@@ -155,9 +153,7 @@ def full_rudder_deg(model: ShipModel) -> float:
     return min(35.0, model.steering.rudder_limit_deg)
 
 
-def standard_circles(
-    model: ShipModel, water_depth: float = np.inf
-) -> dict[str, Manoeuvre]:
+def standard_circles(model: ShipModel) -> dict[str, Manoeuvre]:
     """Turning circles with full rudder to both sides."""
     duration, dt = standard_time(model)
     full = full_rudder_deg(model)
@@ -168,7 +164,6 @@ def standard_circles(
             rudder_deg=sign * full,
             duration=duration,
             dt=dt,
-            water_depth=water_depth,
         )
         name = f"turning circle {full:.0f} deg to {side}"
         circles[name] = Manoeuvre(sail, turning_indices, TurningIndices)

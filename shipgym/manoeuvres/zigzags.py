@@ -229,9 +229,7 @@ def _overshoot_deg(
     return float(change_deg[largest]) - switch
 
 
-def standard_zigzags(
-    model: ShipModel, water_depth: float = np.inf
-) -> dict[str, Manoeuvre]:
+def standard_zigzags(model: ShipModel) -> dict[str, Manoeuvre]:
     """Zigzags 10/10 and 20/20 to both sides; one that never reverses has no indices."""
     duration, dt = standard_time(model)
     zigzags = {}
@@ -244,7 +242,6 @@ def standard_zigzags(
                 port_first=sign < 0.0,
                 duration=duration,
                 dt=dt,
-                water_depth=water_depth,
                 must_reverse=False,
             )
             name = f"zigzag {angle:.0f}/{angle:.0f}, {side} first"

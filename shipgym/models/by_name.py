@@ -18,16 +18,13 @@ def takes_name(function: Function) -> Function:
 
     Anything else is an InputError.
     """
-    place = [*inspect.signature(function).parameters].index("model")
+    signature = inspect.signature(function)
 
     @functools.wraps(function)
     def wrapped(*given: Any, **named: Any) -> Any:
-        if "model" in named:
-            named["model"] = ship_of(named["model"])
-        elif place < len(given):
-            ship = ship_of(given[place])
-            given = (*given[:place], ship, *given[place + 1 :])
-        return function(*given, **named)
+        bound = signature.bind(*given, **named)
+        bound.arguments["model"] = ship_of(bound.arguments["model"])
+        return function(*bound.args, **bound.kwargs)
 
     return cast(Function, wrapped)
 

@@ -24,7 +24,6 @@ from shipgym.ships.structures import (
 if TYPE_CHECKING:  # imported with the ships that need them
     from shipgym.ships.equations import ShipEquations
     from shipgym.ships.grey_boxes import GreyBox
-    from shipgym.ships.terms import Term
 
 LIBRARY = Path(__file__).parent / "library"
 
@@ -187,32 +186,24 @@ def load_model(name: str | Path) -> ShipModel:
 
 
 def grey_box(
-    reference: str | ShipModel,
-    equations: Mapping[str, str | tuple[Term, ...]] | None = None,
-    shaft: bool | None = None,
+    reference: str | ShipModel, equations: Mapping[str, str] | None = None
 ) -> GreyBox:
     """A reference ship plus a table of terms, as a structure.
 
     The reference is a shipped model's name, the path of a model file, or a model. The
     terms, by equation `u`, `v`, `r`, are in units of service speed (`read_terms`), by
     default Mei's: du (the speed above service speed), v, r, delta and a constant, in
-    all three. `shaft` says whether the target's shaft speed is known, by default if the
-    reference ship knows one. Raises InputError for a reference that does not exist or
-    cannot be one, or a table that cannot be computed.
+    all three. The target's shaft speed is known if the reference ship knows one. Raises
+    InputError for a reference that does not exist or cannot be one, or a table that
+    cannot be computed.
     """
     from shipgym.ships.grey_boxes import SOURCE, GreyBox
     from shipgym.ships.terms import read_terms
 
     ship = reference if isinstance(reference, ShipModel) else load_model(reference)
-    table = {}
-    # Terms of Mei, Sun & Shi 2019 in each equation of a grey box.
-    mei = "du, v, r, delta, 1"
-    given = equations or dict.fromkeys("uvr", mei)
-    for equation, terms in given.items():
-        if isinstance(terms, str):
-            terms = read_terms(terms)
-        table[equation] = tuple(terms)
-
+    # terms of Mei, Sun & Shi 2019 in each equation
+    given = equations or dict.fromkeys("uvr", "du, v, r, delta, 1")
+    table = {equation: read_terms(terms) for equation, terms in given.items()}
     bare = replace(ship, covariance=None, draws=None, envelope=None, provenance=None)
     return GreyBox(
         name="grey-box",
@@ -221,7 +212,7 @@ def grey_box(
         normalisation="service",
         quantity="acceleration",
         reference=bare,
-        shaft="n" in ship.command_names if shaft is None else shaft,
+        shaft="n" in ship.command_names,
     )
 
 

@@ -1,6 +1,6 @@
 """Checks for any ship model, including a user's own."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,13 @@ from shipgym.ships.manoeuvring_model import ship_of
 from shipgym.ships.term_table import Structure
 from shipgym.trials.trial import Trial
 
-STRAIGHT_LENGTHS = 30.0  # ship lengths of a run
+STEPS = 50  # of simulations, a ship length
+#: Courses, and their rudders by the limit.
+SIDES = {
+    "straight ahead": 0.0,
+    "full rudder to starboard": 1.0,
+    "full rudder to port": -1.0,
+}
 
 
 def check_ship_model(model: ShipModel | str | Path) -> Findings:
@@ -40,13 +46,19 @@ def check_ship_model(model: ShipModel | str | Path) -> Findings:
         return Findings(name, (str(error),))
     if problems:
         return Findings(name, tuple(problems))
-    problems += _wrong_courses(model)
-    problems += _wrong_rudder(model)
-    return Findings(
-        name,
-        tuple(problems),
-        tuple(_unusual(model)),
-    )
+    runs = {}
+    for side, rudder in SIDES.items():
+        try:
+            runs[side] = _run(model, rudder * model.steering.limit)
+        except UnstableModelError as error:
+            problems.append(
+                f"{side}: {error}; identify it from trials with larger rudder angles,"
+                " or with fewer terms"
+            )
+    problems += _capsized(runs)
+    if _steers(model):
+        problems += _wrong_rudder(runs)
+    return Findings(name, tuple(problems), tuple(_unusual(model, runs)))
 
 
 def _states(model: ShipModel) -> dict[str, Floats]:
@@ -95,61 +107,35 @@ def _where_to_look(model: ShipModel, at: dict[str, float]) -> str:
     return f"at {model.dynamics.fault(at, numbers.tolist(), ship_of(model))}"
 
 
-def _run(model: ShipModel, rudder: float, lengths: float) -> Trial:
-    """Run from service with the rudder held, over a number of ship lengths."""
-    step = 0.02  # ship lengths
-    n_steps = round(lengths / step)
-    held = orders(model, np.full(n_steps, rudder))
-    return model.simulate(held, step * model.travel_time)
+def _run(model: ShipModel, rudder: float) -> Trial:
+    """Run from service with the rudder held, over 40 ship lengths."""
+    held = orders(model, np.full(40 * STEPS, rudder))
+    return model.simulate(held, model.travel_time / STEPS)
 
 
-def _wrong_courses(model: ShipModel) -> Iterator[str]:
-    limit = model.steering.limit
-    turn_lengths = 40.0
-    capsized = np.radians(60.0)
-    courses = {
-        "straight ahead": (0.0, STRAIGHT_LENGTHS),
-        f"rudder {np.degrees(limit):.0f} deg to starboard": (limit, turn_lengths),
-        f"rudder {np.degrees(limit):.0f} deg to port": (-limit, turn_lengths),
-    }
-    for name, (rudder, lengths) in courses.items():
-        try:
-            trial = _run(model, rudder, lengths)
-            heel = float(np.abs(trial["phi"]).max()) if "phi" in trial else 0.0
-            wrong = ""
-        except UnstableModelError as error:
-            heel = abs(error.state.get("phi", 0.0))
-            wrong = (
-                f"{error}; identify it from trials with larger rudder angles, or with"
-                " fewer terms"
+def _capsized(runs: Mapping[str, Trial]) -> Iterator[str]:
+    for side, run in runs.items():
+        if "phi" not in run:
+            return
+        heel_deg = np.degrees(np.abs(run["phi"]).max())
+        if heel_deg >= 60.0:
+            yield (
+                f"{side}: expected a heel of less than 60 deg, got {heel_deg:.3g} deg;"
+                " look at the terms of roll, whose coefficient of phi rights the ship"
+                " where it is negative; identify it from trials with more roll"
             )
-        if not heel < capsized:
-            wrong = (
-                f"expected a heel of less than {np.degrees(capsized):.0f} deg, got"
-                f" {np.degrees(heel):.3g} deg; look at the terms of roll, whose"
-                " coefficient of phi rights the ship where it is negative; identify it"
-                " from trials with more roll"
-            )
-        if wrong:
-            yield f"{name}: {wrong}"
 
 
-def _wrong_rudder(model: ShipModel) -> Iterator[str]:
+def _wrong_rudder(runs: Mapping[str, Trial]) -> Iterator[str]:
     """Say if a rudder to starboard turns the ship less than one to port."""
-    rudder = np.radians(5.0)
-    lengths = 3.0
-    try:
-        starboard = np.degrees(_run(model, rudder, lengths)["r"][-1])
-        port = np.degrees(_run(model, -rudder, lengths)["r"][-1])
-    except UnstableModelError:
-        return  # the courses say so
-    if _steers(model) and not starboard > port:
+    turned = [run["r"][3 * STEPS] for side, run in runs.items() if SIDES[side]]
+    if len(turned) == 2 and not turned[0] > turned[1]:
+        starboard, port = np.degrees(turned)
         yield (
-            "rudder: expected a larger yaw rate for a rudder to starboard than to port,"
-            f" got {starboard:.3g} deg/s for {np.degrees(rudder):.0f} deg to starboard"
-            f" and {port:.3g} deg/s for as much to port; a positive rudder turns to"
-            " starboard: read the trials with rudder_positive='port', or turn the signs"
-            " of the terms odd in the rudder"
+            "rudder: expected a larger yaw rate to starboard than to port, got"
+            f" {starboard:.3g} deg/s with full rudder to starboard and {port:.3g} deg/s"
+            " to port; a positive rudder turns to starboard: read the trials with"
+            " rudder_positive='port', or turn the signs of the terms odd in the rudder"
         )
 
 
@@ -161,14 +147,11 @@ def _steers(model: ShipModel) -> bool:
     )
 
 
-def _unusual(model: ShipModel) -> Iterator[str]:
+def _unusual(model: ShipModel, runs: Mapping[str, Trial]) -> Iterator[str]:
     if not _steers(model):
         yield "no rudder turns this model: an autopilot has nothing to do on it"
-    try:
-        straight = _run(model, 0.0, STRAIGHT_LENGTHS)
-    except UnstableModelError:
-        return
-    kept = float(straight["u"][-1]) / model.particulars["speed"]
+    ahead = runs.get("straight ahead")
+    kept = 1.0 if ahead is None else ahead["u"][-1] / model.particulars["speed"]
     if not 0.7 < kept < 1.3:
         yield (
             "straight ahead with the rudder amidships its speed becomes"

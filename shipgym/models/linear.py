@@ -220,11 +220,12 @@ def nomoto_of(A: Floats, B: Floats) -> Nomoto:
             "nomoto: expected a ship with damping, whose rudder has a steady effect,"
             " got none"
         )
-    time_constants = [np.nan, np.nan]
+    T1 = T2 = np.nan
     poles = np.linalg.eigvals(A)
-    if np.all(np.isreal(poles)):
-        time_constants = (-1.0 / poles.real).tolist()
-    T1, T2 = sorted(time_constants, key=abs, reverse=True)
+    is_real = np.isrealobj(poles)
+    if is_real:
+        times = -1.0 / poles
+        T1, T2 = sorted(times.tolist(), key=abs, reverse=True)
     T3 = float(B[1, 0]) / numerator
     return Nomoto(
         K=numerator / determinant,

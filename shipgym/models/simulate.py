@@ -62,14 +62,11 @@ class Passage:
         """Loop of `shipgym.engine.loops` for the ship in calm water or weather."""
         return ship_loop(self.compiled, name, OPEN_SEA if self.windy else STILL_WATER)
 
-    def run(
-        self, name: str, states: Floats, *arguments: Any, since: float = 0.0
-    ) -> Any:
+    def run(self, name: str, states: Floats, *arguments: Any) -> Any:
         """Fill the states after the first by a loop; sea and ship are added here.
 
         Returns what the loop returns: the last row, or that and more. Raises
-        UnstableModelError where the ship leaves every physical range, `since` s after
-        the manoeuvre began.
+        UnstableModelError where the ship leaves every physical range.
         """
         loop = self.loop(name)
         found = loop(
@@ -82,7 +79,7 @@ class Passage:
         if reached < len(states) - 1:
             raise unstable(
                 self.model,
-                since + self.dt * reached,
+                self.dt * reached,
                 states[reached],
             )
         return found
@@ -220,15 +217,8 @@ def open_loop_states(model: ManoeuvringModel, trial: Trial, starts: Floats) -> F
 
 def first_state(model: ManoeuvringModel, trial: Trial) -> Floats:
     """State at a trial's first sample, by its channels; 0 for those it has not."""
-    first = {}
-    for name in ("psi", "u", "v", "r", "delta", *model.command_names[1:]):
-        if name not in trial.channels:
-            raise InputError(
-                f"trial {trial.name!r}: channel {name!r} is missing, it is needed to"
-                " predict the trial"
-            )
-        first[name] = trial[name][:1]
-
+    needed = ("psi", "u", "v", "r", "delta", *model.command_names[1:])
+    first = {name: trial[name][:1] for name in needed}
     state = np.zeros(len(model.state_names))
     for i, name in enumerate(model.state_names):
         if name in trial.channels:
@@ -300,22 +290,11 @@ def unstable(
 ) -> UnstableModelError:
     """Make the error for a ship whose state grew beyond bounds at a given time."""
     last = dict(zip(model.state_names, state.tolist(), strict=False))
-    turn_deg_s = np.degrees(last["r"])
-    there = (
-        f"u = {last['u']:.3g} m/s, v = {last['v']:.3g} m/s, r = {turn_deg_s:.3g} deg/s"
+    named = ("u", "v", "r", "phi")
+    values = [f"{name} = {last[name]:.3g}" for name in named if name in last]
+    there = ", ".join(values)
+    message = (
+        f"model {model.name!r} runs away after {time_s:.1f} s ({there}, SI units): it"
+        " is unstable there; check_ship_model says more"
     )
-    if "phi" in last:
-        heel_deg = np.degrees(last["phi"])
-        there += f", phi = {heel_deg:.3g} deg"
-    reason = "it is unstable there"
-    if getattr(
-        model.dynamics,
-        "path",
-        None,
-    ):  # a user's own
-        reason += ", or her equations give no number (check_ship_model says where)"
-    return UnstableModelError(
-        f"model {model.name!r} runs away after {time_s:.1f} s ({there}): {reason}",
-        time_s,
-        last,
-    )
+    return UnstableModelError(message, time_s, last)

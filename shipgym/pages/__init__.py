@@ -4,16 +4,9 @@ A page extends `shipgym.pages/page.html` and consists of the macros in
 `shipgym.pages/parts.html`.
 """
 
-from shipgym.pages.numbers import MINUS, NONE, fixed, number, percent
-from shipgym.pages.templates import environment, plotly_script, render
-
-__all__ = [
-    "MINUS",
-    "NONE",
-    "environment",
-    "fixed",
-    "number",
-    "percent",
-    "plotly_script",
-    "render",
-]
+from shipgym.pages.numbers import NONE as NONE
+from shipgym.pages.numbers import fixed as fixed
+from shipgym.pages.numbers import number as number
+from shipgym.pages.numbers import percent as percent
+from shipgym.pages.templates import environment as environment
+from shipgym.pages.templates import render as render

@@ -3,7 +3,7 @@
 from typing import Any
 
 from shipgym.extras import axes_of
-from shipgym.plots.style import Panel
+from shipgym.plots.style import Panel, as_axis
 
 DASHES = {"dot": ":", "dash": "--"}
 
@@ -26,10 +26,7 @@ def draw(panel: Panel, ax: Any = None) -> Any:
             dash = DASHES.get(trace.get("line_dash", ""), "-")
             width = 0.75 * line["width"]  # of pixels in points
             ax.plot(x, y, dash, color=line["color"], linewidth=width, label=label)
-    x_axis, y_axis = (
-        {"title": {"text": given}} if isinstance(given, str) else given
-        for given in (panel.x, panel.y)
-    )
+    x_axis, y_axis = as_axis(panel.x), as_axis(panel.y)
     ax.set(xlabel=x_axis["title"]["text"], ylabel=y_axis["title"]["text"])
     if "ticktext" in y_axis:
         ax.set_yticks(y_axis["tickvals"], y_axis["ticktext"])

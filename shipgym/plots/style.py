@@ -81,8 +81,8 @@ def panels(
     drawn = figure.layout.to_plotly_json()
     for k, panel in enumerate(shown):
         number = _axis_number(k)
-        x = _axis(panel.x)
-        y = _axis(panel.y)
+        x = as_axis(panel.x)
+        y = as_axis(panel.y)
         if outer and k < columns * (rows - 1):
             x["title"] = {"text": ""}
         if outer and k % columns:
@@ -121,12 +121,13 @@ def _axis_number(k: int) -> str:
 
 def _titled(panel: Panel) -> Panel:
     """A panel whose vertical axis is told above it: a title beside it takes width."""
-    y = _axis(panel.y)
+    y = as_axis(panel.y)
     title = y["title"]["text"]
     return panel._replace(y={**y, "title": {"text": ""}}, title=title)
 
 
-def _axis(given: Axis) -> dict[str, Any]:
+def as_axis(given: Axis) -> dict[str, Any]:
+    """An axis, also of its title alone."""
     return axis(given) if isinstance(given, str) else dict(given)
 
 

@@ -4,19 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import MISSING, asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from shipgym.checks import (
+    bounded,
     check_choice,
     check_flag,
-    check_number,
     check_table,
     check_text,
+    keep_numbers,
+    placed,
+    read_fields,
 )
 from shipgym.constants import GRAVITY
 from shipgym.errors import InputError
 from shipgym.sea.wind_coefficients import check_coefficients
+
+
+def _direction() -> Any:
+    """Field of a direction; None is to be drawn."""
+    hint = "degrees clockwise from north"
+    return bounded(None, at_least=-360.0, at_most=360.0, hint=hint)
 
 
 @dataclass(frozen=True)
@@ -39,16 +48,13 @@ class Current:
         Of the first-order Gauss-Markov process of the variation, s.
     """
 
-    speed: float
-    towards_deg: float | None = None
-    variation: float = 0.0
-    time_constant: float = 600.0
+    speed: float = bounded(at_least=0.0, at_most=10.0)
+    towards_deg: float | None = _direction()
+    variation: float = bounded(0.0, at_least=0.0, at_most=5.0)
+    time_constant: float = bounded(600.0, above=0.0, hint="in s")
 
     def __post_init__(self) -> None:
-        _keep_number(self, "current", "speed", at_least=0.0, at_most=10.0)
-        _keep_number(self, "current", "variation", at_least=0.0, at_most=5.0)
-        _keep_number(self, "current", "time_constant", above=0.0, hint="in s")
-        _keep_direction(self, "current", "towards_deg")
+        keep_numbers(self, "current ")
 
     @property
     def calm(self) -> bool:
@@ -76,14 +82,13 @@ class Wind:
         type of ship.
     """
 
-    speed: float
-    from_deg: float | None = None
+    speed: float = bounded(at_least=0.0, at_most=75.0)
+    from_deg: float | None = _direction()
     gust: bool = True
     coefficients: str = "blendermann"
 
     def __post_init__(self) -> None:
-        _keep_number(self, "wind", "speed", at_least=0.0, at_most=75.0)
-        _keep_direction(self, "wind", "from_deg")
+        keep_numbers(self, "wind ")
         check_coefficients(self.coefficients, "wind coefficients")
         check_flag(self.gust, "wind gust")
 
@@ -118,17 +123,14 @@ class Waves:
         at all, as in a tank or a swell.
     """
 
-    significant_height: float
-    peak_period: float
-    from_deg: float | None = None
-    peak_enhancement: float = 3.3
+    significant_height: float = bounded(at_least=0.0, at_most=20.0)
+    peak_period: float = bounded(above=0.0, at_most=40.0, hint="in s")
+    from_deg: float | None = _direction()
+    peak_enhancement: float = bounded(3.3, at_least=1.0, at_most=20.0)
     spreading: Literal["cosine-squared", "long-crested"] = "cosine-squared"
 
     def __post_init__(self) -> None:
-        _keep_number(self, "waves", "significant_height", at_least=0.0, at_most=20.0)
-        _keep_number(self, "waves", "peak_period", above=0.0, at_most=40.0, hint="in s")
-        _keep_number(self, "waves", "peak_enhancement", at_least=1.0, at_most=20.0)
-        _keep_direction(self, "waves", "from_deg")
+        keep_numbers(self, "waves ")
         check_choice(
             self.spreading,
             ("cosine-squared", "long-crested"),
@@ -147,19 +149,6 @@ class Waves:
     def calm(self) -> bool:
         """True where the sea is flat."""
         return self.significant_height == 0.0
-
-
-def _keep_number(part: Any, where: str, name: str, **bounds: Any) -> None:
-    """Make a float of a field, which must be within bounds (`check_number`)."""
-    number = check_number(getattr(part, name), f"{where} {name}", **bounds)
-    object.__setattr__(part, name, number)
-
-
-def _keep_direction(part: Any, where: str, name: str) -> None:
-    """Make a float of a direction, unless it is to be drawn."""
-    if getattr(part, name) is not None:
-        hint = "degrees clockwise from north"
-        _keep_number(part, where, name, at_least=-360.0, at_most=360.0, hint=hint)
 
 
 PARTS: dict[str, type[Any]] = {"current": Current, "wind": Wind, "waves": Waves}
@@ -205,9 +194,8 @@ class Weather:
 
     def __post_init__(self) -> None:
         check_text(self.name, "weather name")
-        for name in ("current", "wind", "waves"):
+        for name, kind in PARTS.items():
             part = getattr(self, name)
-            kind = PARTS[name]
             if isinstance(part, kind) or part is None:
                 continue
             raise InputError(
@@ -273,20 +261,9 @@ class Weather:
         for name, kind in PARTS.items():
             content = table.get(name)
             if content is not None:
-                parts[name] = _read_part(kind, content, f"{where} {name}")
+                parts[name] = read_fields(kind, content, f"{where} {name}")
         name = table.get("name", "weather")
         return cls(**parts, name=name)
-
-
-def _read_part(kind: type[Any], content: Any, where: str) -> Any:
-    known = fields(kind)
-    table = check_table(
-        content,
-        where,
-        allowed=[field.name for field in known],
-        required=[field.name for field in known if field.default is MISSING],
-    )
-    return kind(**table)
 
 
 def as_weather(
@@ -309,8 +286,5 @@ def as_weather(
             f"{where}: expected a Weather of shipgym.sea or the name of a sea state,"
             f" got {weather!r}"
         )
-    try:
+    with placed(where):
         return Weather.from_sea_state(weather, from_deg)
-    except InputError as error:
-        reason = str(error).removeprefix("sea state: ")
-        raise InputError(f"{where}: {reason}") from None

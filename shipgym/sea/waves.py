@@ -175,8 +175,6 @@ def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:
     is taken. The Gaussian s lacks the long tail of the exponential distribution and
     falls below -1 for 16 % of the time.
     """
-    if waves.calm:
-        return GaussMarkov(1.0, 0.0)
     omega = frequencies(waves)
     ship = weather_particulars(particulars)
     draught = ship.require("draught")

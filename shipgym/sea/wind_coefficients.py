@@ -25,15 +25,10 @@ _TABLES = shipped_toml("shipgym.sea", "wind.toml")
 BLENDERMANN = {ship: Blendermann(*row) for ship, row in _TABLES["blendermann"].items()}
 
 
-def coefficient_names() -> tuple[str, ...]:
-    """Words that `Wind(coefficients=...)` understands."""
-    types = [f"blendermann-{ship}" for ship in BLENDERMANN]
-    return ("blendermann", *types)
-
-
 def check_coefficients(value: Any, where: str) -> None:
     """Raise InputError for what `Wind(coefficients=...)` does not understand."""
-    check_choice(value, coefficient_names(), where)
+    types = [f"blendermann-{ship}" for ship in BLENDERMANN]
+    check_choice(value, ("blendermann", *types), where)
 
 
 def blendermann_type(name: str, block_coefficient: float) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_array, check_table, unexpected
+from shipgym.checks import check_arrays, check_table, unexpected
 
 ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
 SHAPES = {"low": (4,), "high": (4,), "centre": (4,), "shape": (4, 4)}
@@ -75,15 +75,11 @@ class Envelope:
     @classmethod
     def from_dict(cls, content: Any, where: str) -> Self:
         """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
-        table = check_table(content, where, allowed=("channels", *SHAPES))
-        found = table.get("channels")
+        table = dict(check_table(content, where))
+        found = table.pop("channels", None)
         if found != list(ENVELOPE_CHANNELS):
             raise unexpected(f"{where}.channels", str(ENVELOPE_CHANNELS), found)
-        arrays = {
-            name: check_array(table.get(name), shape, f"{where}.{name}")
-            for name, shape in SHAPES.items()
-        }
-        return cls(**arrays)
+        return cls(**check_arrays(table, SHAPES, where))
 
 
 @lru_cache(maxsize=8)  # structures that are compared have the same trials

@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_flag, check_number, check_text, placed, unexpected
+from shipgym.checks import check_number, check_text, placed, unexpected
 from shipgym.engine.compiled_ship import CompiledShip, compiled_ship
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.records import Record, field_types, is_record
@@ -96,8 +96,6 @@ class ShipEquations:
         where = f"equations of {self.name!r}"
         check_text(self.source, f"{where}: source")
         self._check_coefficients(where)
-        for flag in ("rolls", "shallow_water", "astern"):
-            check_flag(getattr(self, flag), f"{where}: {flag}")
         what = "a function (motion, c, ship)"
         check_function(self.accelerations, 3, f"{where}: accelerations", what)
         shaft = self.shaft_acceleration

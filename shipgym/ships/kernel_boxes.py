@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_array, check_flag, check_table, check_text
+from shipgym.checks import check_arrays, check_flag
 from shipgym.engine import stages
 from shipgym.engine.compiled_ship import CompiledShip
 from shipgym.engine.lane_records import Point, Sums
@@ -100,20 +100,15 @@ class Kernel:
     @classmethod
     def from_dict(cls, content: Any, where: str) -> Self:
         """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
-        table = check_table(content, where, SHAPES)
-        arrays = {}
-        for name, shape in SHAPES.items():
-            given = table.get(name)
-            arrays[name] = check_array(given, shape, f"{where}.{name}")
-        return cls(**arrays)
+        return cls(**check_arrays(content, SHAPES, where))
 
 
 def kernel_inputs(channels: Mapping[str, Any], particulars: Particulars) -> Floats:
     """Inputs v / U, r L / U, rudder angle and U / U0; shape (n_samples, 4)."""
-    u = np.asarray(channels["u"], dtype=float)
-    v = np.asarray(channels["v"], dtype=float)
-    r = np.asarray(channels["r"], dtype=float)
-    delta = np.asarray(channels["delta"], dtype=float)
+    u = channels["u"]
+    v = channels["v"]
+    r = channels["r"]
+    delta = channels["delta"]
     L = particulars["length"]
     U0 = particulars["speed"]
     U = np.maximum(np.hypot(u, v), SLOWEST * U0)
@@ -152,8 +147,7 @@ class KernelBox(GreyBox):
         shaft_speed: float = 0.0,
     ) -> Floats:
         """Features of the kernel by U^2, shape (n_samples, n_features)."""
-        u = np.asarray(channels["u"], dtype=float)
-        v = np.asarray(channels["v"], dtype=float)
+        u, v = channels["u"], channels["v"]
         UU = u * u + v * v
         features = self.kernel.features(channels, particulars)
         return np.asarray(UU[:, None] * features)
@@ -209,14 +203,9 @@ class KernelBox(GreyBox):
         cls, table: Mapping[str, Any], where: str, reference: ManoeuvringModel
     ) -> Self:
         """Read what `to_dict` wrote, given the reference; errors begin with `where`."""
-        check_text(table.get("source"), f"{where}.source")
-        fields = _kernel_fields(
-            name=check_text(table.get("name"), f"{where}.name"),
-            reference=reference,
-            shaft=check_flag(table.get("shaft", False), f"{where}.shaft"),
-            kernel=Kernel.from_dict(table["kernel"], f"{where}.kernel"),
-        )
-        return cls(**fields)
+        kernel = Kernel.from_dict(table["kernel"], f"{where}.kernel")
+        shaft = check_flag(table.get("shaft", False), f"{where}.shaft")
+        return cls(**_kernel_fields(table.get("name", ""), reference, shaft, kernel))
 
 
 def kernel_box(box: GreyBox, kernel: Kernel) -> KernelBox:

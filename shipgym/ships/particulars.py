@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any, NamedTuple, Self
 
@@ -12,11 +12,11 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.checks import (
-    check_number,
+    bounded,
     check_table,
     check_text,
+    keep_numbers,
     placed,
-    quoted,
     unexpected,
 )
 from shipgym.constants import SEA_WATER
@@ -32,26 +32,14 @@ _IN_PRIME_SYSTEM = (
 )
 
 
-def _known(share: float | None = None, is_area: bool = False, **bounds: Any) -> Any:
-    """Field of a value that may be unknown, within bounds (`check_number`).
-
-    `share`: the largest part of the length, of an area of the length squared.
-    """
-    limits = {"bounds": bounds, "share": share, "is_area": is_area}
-    return field(default=None, metadata=limits)
-
-
-def _size(share: float | None = None, is_area: bool = False) -> Any:
-    """Field of a value above 0."""
-    return _known(share, is_area, above=0.0)
+def _size() -> Any:
+    """Field of a value above 0 that may be unknown."""
+    return bounded(None, above=0.0)
 
 
 def _added_mass(below: float) -> Any:
     """Field of a derivative by an acceleration."""
-    return _known(above=-1.0, below=below, hint=_IN_PRIME_SYSTEM)
-
-
-_LENGTH = {"above": 0.01, "below": 2000.0, "hint": "between perpendiculars, in m"}
+    return bounded(None, above=-1.0, below=below, hint=_IN_PRIME_SYSTEM)
 
 
 @dataclass(frozen=True)
@@ -96,32 +84,37 @@ class Particulars(Mapping[str, Any]):
         Names of the values that were estimated.
     """
 
-    length: float = field(metadata={"bounds": _LENGTH, "share": None})
+    length: float = bounded(
+        above=0.01, below=2000.0, hint="between perpendiculars, in m"
+    )
     name: str = "ship"
-    beam: float | None = _size(1.0)
-    draught: float | None = _size(0.5)
+    beam: float | None = _size()
+    draught: float | None = _size()
     mass: float | None = _size()
-    xg: float | None = _known(0.5)
-    yaw_gyradius: float | None = _size(0.7)
-    block_coefficient: float | None = _known(above=0.0, below=1.0)
-    speed: float | None = _known(
-        above=0.0, below=50.0, hint="in m/s; a knot is 0.514 m/s"
+    xg: float | None = bounded(None)
+    yaw_gyradius: float | None = _size()
+    block_coefficient: float | None = bounded(None, above=0.0, below=1.0)
+    speed: float | None = bounded(
+        None, above=0.0, below=50.0, hint="in m/s; a knot is 0.514 m/s"
     )
     rudder_area: float | None = _size()
-    propeller_diameter: float | None = _size(0.5)
-    rudder_aspect_ratio: float | None = _known(above=0.0, below=10.0)
-    propeller_pitch_ratio: float | None = _known(above=0.0, below=3.0)
-    rudders: float | None = _known(above=0.0, below=9.0)
-    propellers: float | None = _known(above=0.0, below=9.0)
-    length_overall: float | None = _size(2.0)
-    frontal_area: float | None = _size(0.5, is_area=True)
-    lateral_area: float | None = _size(0.5, is_area=True)
-    lateral_centroid: float | None = _known(0.5)
-    lateral_centroid_height: float | None = _size(0.5)
-    metacentric_height: float | None = _size(0.2)
-    roll_period: float | None = _known(above=0.0, below=200.0)
-    water_density: float | None = _known(
-        above=500.0, below=1500.0, hint="in kg/m3; fresh water has 1000, sea water 1025"
+    propeller_diameter: float | None = _size()
+    rudder_aspect_ratio: float | None = bounded(None, above=0.0, below=10.0)
+    propeller_pitch_ratio: float | None = bounded(None, above=0.0, below=3.0)
+    rudders: float | None = bounded(None, above=0.0, below=9.0)
+    propellers: float | None = bounded(None, above=0.0, below=9.0)
+    length_overall: float | None = _size()
+    frontal_area: float | None = _size()
+    lateral_area: float | None = _size()
+    lateral_centroid: float | None = bounded(None)
+    lateral_centroid_height: float | None = _size()
+    metacentric_height: float | None = _size()
+    roll_period: float | None = bounded(None, above=0.0, below=200.0)
+    water_density: float | None = bounded(
+        None,
+        above=500.0,
+        below=1500.0,
+        hint="in kg/m3; fresh water has 1000, sea water 1025",
     )
     X_udot: float | None = _added_mass(0.0)
     Y_vdot: float | None = _added_mass(0.0)
@@ -132,25 +125,18 @@ class Particulars(Mapping[str, Any]):
 
     def __post_init__(self) -> None:
         check_text(self.name, "name")
-        numbers = {}
-        for name in LIMITS:
-            value = getattr(self, name)
-            if value is None and name != "length":
-                continue
-            number = check_value(name, value)
-            numbers[name] = number
-            object.__setattr__(self, name, number)
-
+        keep_numbers(self)
         names = self.estimated
         listed = isinstance(names, list | tuple | set | frozenset)
         if not listed or not all(name in NAMES for name in names):
             raise unexpected("estimated", "a list of names of values", names)
         object.__setattr__(self, "estimated", frozenset(names))
         # what was given is held against what was given alone
-        given = {"length": numbers["length"]}
-        for name, value in numbers.items():
-            if name not in names:
-                given[name] = value
+        given = {
+            name: value
+            for name, value in self.items()
+            if value is not None and name not in names
+        }
         check_together(given)
 
     def __getitem__(self, name: str) -> Any:
@@ -175,27 +161,16 @@ class Particulars(Mapping[str, Any]):
         InputError, beginning with `where`, for an unknown key, a missing length, a
         wrong type or a value that no ship has.
         """
-        table = dict(check_table(mapping, where, (*NAMES, "added_mass", "estimated")))
+        known = (*NAMES, "added_mass", "estimated")
+        table = dict(check_table(mapping, where, known, ("length",)))
         added = table.pop("added_mass", None) or {}
         check_table(added, f"{where} added_mass", ADDED_MASSES)
-        if table.get("length") is None:
-            raise InputError(
-                f"{where} length: expected the length between perpendiculars in m, got"
-                " none"
-            )
-        estimated: Any = table.pop("estimated", None) or ()
-        twice = table.keys() & added.keys()
-        if twice:
-            raise InputError(
-                f"{where} added_mass: expected each value in one place, got"
-                f" {quoted(sorted(twice))} twice"
-            )
         with placed(where, " "):
-            return cls(**(table | added), estimated=estimated)
+            return cls(**(table | added))
 
     def to_dict(self) -> dict[str, Any]:
         """Values by name, ready for JSON; :meth:`from_mapping` reads them."""
-        # left out where not known, so that hashes of models from before them stay
+        # left out where not known: other hashes of a model are those of another ship
         later = {
             "rudder_aspect_ratio",
             "propeller_pitch_ratio",
@@ -255,8 +230,20 @@ NAMES: tuple[str, ...] = tuple(
     item.name for item in fields(Particulars) if item.name != "estimated"
 )
 
-#: Limits of the numbers.
-LIMITS = {item.name: item.metadata for item in fields(Particulars) if item.metadata}
+#: Largest part of the length that a value has, of areas of the length squared.
+SHARES = {
+    "beam": 1.0,
+    "draught": 0.5,
+    "xg": 0.5,
+    "yaw_gyradius": 0.7,
+    "propeller_diameter": 0.5,
+    "length_overall": 2.0,
+    "frontal_area": 0.5,
+    "lateral_area": 0.5,
+    "lateral_centroid": 0.5,
+    "lateral_centroid_height": 0.5,
+    "metacentric_height": 0.2,
+}
 
 Estimates = Mapping[str, Callable[[Particulars], float | None]]
 
@@ -392,30 +379,16 @@ _ESTIMATES: Estimates = {  # in this order
 # ---- limits: a value beyond them is mostly in a wrong unit ----------
 
 
-def check_value(name: str, value: Any) -> float:
-    """Return one value as float; InputError, naming it, for what no ship has."""
-    place = f"added_mass {name}" if name in ADDED_MASSES else name
-    return check_number(value, place, **LIMITS[name]["bounds"])
-
-
 def check_together(values: Mapping[str, float]) -> None:
     """Refuse values, the length among them, that do not fit each other."""
     length = values["length"]
-    for name, value in values.items():
-        limits = LIMITS[name]
-        share = limits["share"]
-        if share is None:
-            continue
-        is_area = limits["is_area"]
-        reference = length * length if is_area else length
-        largest = share * reference
-        if abs(value) > largest:
-            squared = " squared" if is_area else ""
-            unit = "m2" if is_area else "m"
-            expected = f"at most {share:g} of the length{squared}"
+    for name, share in SHARES.items():
+        power = 2 if name.endswith("_area") else 1
+        if abs(values.get(name, 0.0)) > share * length**power:
             raise InputError(
-                f"{name}: expected {expected}, got"
-                f" {value:g} with length {length:g}; check the units ({unit})"
+                f"{name}: expected at most {share:g} of the length"
+                f"{' squared' * (power - 1)}, got {values[name]:g} with length"
+                f" {length:g}; check the units (m{'2' * (power - 1)})"
             )
     if "mass" in values:
         _check_mass(values)
@@ -432,9 +405,6 @@ def _check_mass(values: Mapping[str, float]) -> None:
         unit = density * values["length"] * values["beam"] * values["draught"]
         low, high = 0.2, 1.0
         reason = "a block coefficient of 0.2 to 1"
-        if fullness := values.get("block_coefficient"):
-            low, high = 0.5 * fullness, 2.0 * fullness
-            reason = "half to twice what block_coefficient gives"
 
     if not low * unit <= mass <= high * unit:
         raise InputError(

@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any, Self
 
-from shipgym.checks import check_number, check_table, placed
+from shipgym.checks import bounded, keep_numbers, placed, read_fields
 
 
 @dataclass(frozen=True)
@@ -33,21 +33,12 @@ class SteeringGear:
         Lag, s; 0 for a gear of constant rate.
     """
 
-    rudder_limit_deg: float = 35.0
-    rudder_rate_deg_s: float = 2.5
-    time_constant: float = 0.0
+    rudder_limit_deg: float = bounded(35.0, above=0.0, at_most=90.0)
+    rudder_rate_deg_s: float = bounded(2.5, above=0.0)
+    time_constant: float = bounded(0.0, at_least=0.0)
 
     def __post_init__(self) -> None:
-        bounds: dict[str, dict[str, Any]] = {
-            "rudder_limit_deg": {"above": 0.0, "at_most": 90.0},
-            "rudder_rate_deg_s": {"above": 0.0},
-            "time_constant": {"at_least": 0.0},
-        }
-        for name in bounds:
-            value = getattr(self, name)
-            allowed = bounds[name]
-            number = check_number(value, name, **allowed)
-            object.__setattr__(self, name, number)
+        keep_numbers(self)
 
     @classmethod
     def from_mapping(
@@ -58,10 +49,8 @@ class SteeringGear:
         Raises InputError, beginning with `where`, for an unknown key or a value out of
         bounds.
         """
-        names = [one.name for one in fields(cls)]
-        table = check_table(mapping, where, names)
         with placed(where, " "):
-            return cls(**table)
+            return read_fields(cls, mapping, where)
 
     def to_dict(self) -> dict[str, float]:
         """Return the three values by name, as :meth:`from_mapping` takes them."""

@@ -209,17 +209,13 @@ class Structure:
         shaft_speed: float,
     ) -> dict[str, Floats]:
         """Values of the speed `U` and of the terms' symbols at samples."""
-        u = np.asarray(channels["u"], dtype=float)
-        v = np.asarray(channels["v"], dtype=float)
-        values = {"U": np.hypot(u, v)}
+        values: dict[str, Floats] = {"U": np.hypot(channels["u"], channels["v"])}
         offsets = {"du": particulars["speed"], "dn": shaft_speed}
         for symbol in self.symbols:
             if symbol == "U":
                 continue
-            name = CHANNEL[symbol]
-            value = np.asarray(channels[name], dtype=float)
-            if symbol in offsets:
-                value = value - offsets[symbol]
+            channel = channels[CHANNEL[symbol]]
+            value = channel - offsets.get(symbol, 0.0)
             if symbol.startswith("|"):
                 value = np.abs(value)
             values[symbol] = value
@@ -316,10 +312,8 @@ class Structure:
         counts = [len(terms) for terms in self.equations.values()]
         blocks = []
         for row, n_rows in zip(mobility, counts, strict=True):
-            block = []
-            for entry, n_columns in zip(row, counts, strict=True):
-                block.append(entry * np.eye(n_rows, n_columns))
-            blocks.append(block)
+            pairs = zip(row, counts, strict=True)
+            blocks.append([entry * np.eye(n_rows, n) for entry, n in pairs])
         return np.block(blocks)
 
     def term_numbers(

@@ -188,9 +188,9 @@ def short_terms(words: str, surge: str = "du") -> tuple[Term, ...]:
 
 
 def read_term_list(content: Any, where: str) -> tuple[Term, ...]:
-    """Read the terms of one equation from a model file, 1 to `MOST_TERMS`."""
-    if not isinstance(content, list) or not 1 <= len(content) <= MOST_TERMS:
-        raise unexpected(where, f"a list of 1 to {MOST_TERMS} entries", content)
+    """Read the terms of one equation from a model file."""
+    if not isinstance(content, list):
+        raise unexpected(where, "a list of terms", content)
     return tuple(
         Term.from_dict(entry, f"{where}[{i}]") for i, entry in enumerate(content)
     )

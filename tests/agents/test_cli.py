@@ -238,8 +238,6 @@ def test_trials_writes_figures_that_work_offline(tmp_path):
         (["no_such.json"], "no_such.json"),
         (["half.json"], "cut short"),
         (["mariner", "--out", "plots.png"], ".html"),
-        (["tanker", "--depth", "18"], "draught of 18.46 m"),
-        (["mariner", "--depth", "30"], "deep-water model"),
     ],
 )
 def test_what_trials_cannot_use_exits_with_2(words, message, tmp_path, monkeypatch):

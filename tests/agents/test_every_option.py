@@ -51,7 +51,6 @@ LINES = (
     ),
     (f"reduce ship.toml {WRONG} --out reduced", 2),
     ("trials linear/model.json --draws 2 --seed 1 --out trials.html", 0),
-    ("trials tanker --draws 0 --depth 25", 0),
     (
         f"autopilot ship.toml {LINEAR} --draws 2 --seed 1 --autopilots"
         " lq,ilos --out report",

@@ -93,7 +93,7 @@ def test_a_suite_is_read_task_by_task():
         (
             'sea = "rough"',
             'sea = "wild"',
-            "tasks.rough: sea: expected one of .* got 'wild'",
+            "tasks.rough: sea state: expected one of .* got 'wild'",
         ),
         ('why = "the easiest"', 'rule = "a:b"', "tasks.calm.rule: expected no code"),
         (

@@ -10,8 +10,8 @@ from __future__ import annotations
 import json
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, is_dataclass
-from functools import cache
+from dataclasses import asdict, is_dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -122,8 +122,10 @@ def record_manoeuvres(name: str) -> dict[str, Floats]:
     if name == "tanker":
         depth = 1.5 * model.particulars["draught"]
         judged |= {
-            f"shallow {what}": lambda one=one: one.evaluate(model)
-            for what, one in manoeuvres.standard_manoeuvres(model, depth).items()
+            f"shallow {what}": lambda one=one: replace(
+                one, sail=partial(one.sail, water_depth=depth)
+            ).evaluate(model)
+            for what, one in manoeuvres.standard_manoeuvres(model).items()
         }
     for what, judge in judged.items():
         found |= told(what, judge)

@@ -44,7 +44,7 @@ def test_a_rudder_that_turns_to_the_wrong_side_is_found(mariner):
         for name, c in mariner.coefficients.items()
     }
     assert (
-        "for 5 deg to starboard"
+        "with full rudder to starboard"
         in check_ship_model(replace(mariner, coefficients=literature)).problems[0]
     )
 
@@ -55,10 +55,10 @@ def test_a_ship_that_runs_away_is_found(mariner):
     )
     problems = check_ship_model(wild).problems
     assert any(
-        "deg to starboard: model 'mariner' runs away after" in problem
+        "rudder to starboard: model 'mariner' runs away after" in problem
         for problem in problems
     )
-    assert any("deg to port" in problem for problem in problems)
+    assert any("rudder to port" in problem for problem in problems)
 
 
 def test_accelerations_that_are_no_numbers_are_found(mariner):
@@ -127,6 +127,6 @@ def test_a_heel_of_sixty_degrees_is_a_capsize(heel_deg, capsized):
     )
     problems = check_ship_model(ship).problems
     assert [one.partition(":")[0] for one in problems] == [
-        "rudder 35 deg to starboard",
-        "rudder 35 deg to port",
+        "full rudder to starboard",
+        "full rudder to port",
     ] * capsized

@@ -124,7 +124,7 @@ def test_what_cannot_be_a_reference_is_refused(
     with pytest.raises(InputError, match="grey box itself"):
         grey_box(bare)
     with pytest.raises(InputError, match="has no shaft speed"):
-        grey_box("mariner", shaft=True)
+        replace(grey_box("mariner"), shaft=True)
     with pytest.raises(InputError, match="give the reference"):
         get_structure("grey-box")
     with pytest.raises(

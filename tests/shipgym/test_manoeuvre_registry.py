@@ -43,7 +43,7 @@ def shift_indices(trial):
     return ShiftIndices(lengths, float(np.degrees(trial["psi"][-1])))
 
 
-def variants(model, water_depth=np.inf):
+def variants(model):
     return {"parallel shift to starboard": manoeuvres.Manoeuvre(
         parallel_shift, shift_indices, ShiftIndices, "Heading and rudder in degrees.")}
 

@@ -126,7 +126,7 @@ def test_particulars_are_a_mapping_and_go_through_json():
         ),
         (
             {"added_mass": {"Y_vdot": 0.0145}},
-            "[ship] added_mass Y_vdot: expected a number > -1 and < 0",
+            "[ship] Y_vdot: expected a number > -1 and < 0",
         ),
         ({"added_mass": {"Y_vdot": -2500.0}}, "in the prime system"),
         ({"added_mass": {"Yvdot": -0.01}}, "Did you mean 'Y_vdot'?"),

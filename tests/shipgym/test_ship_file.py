@@ -164,7 +164,7 @@ def test_trials_can_be_asked_for_by_use(folder):
             "length = -7.0",
             ": [ship] length: ",
         ),
-        ("length = 7.0", "", ": [ship] length: expected"),
+        ("length = 7.0", "", ": [ship]: field 'length' is missing"),
         ("beam =", "beem =", ": [ship]: unknown key 'beem'. Did you mean 'beam'?"),
         (
             "rudder_limit_deg = 35.0",

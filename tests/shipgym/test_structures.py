@@ -60,7 +60,7 @@ def test_accelerations_of_every_structure_are_written_from_its_features(name):
         "delta": 0.2,
         "n": 1.1,
     }
-    channels = {symbol: [value] for symbol, value in state.items()}
+    channels = {symbol: np.array([value]) for symbol, value in state.items()}
     expected, row = (
         {"u": 0.0, "v": 0.9 * 7.7175 / 160.93, "r": 0.01 * 7.7175 / 160.93},
         0,

@@ -10,9 +10,7 @@ import pytest
 from shipgym import InputError, Particulars, Wind, load_model
 from shipgym.sea import weather_particulars, wind_curves
 from shipgym.sea.wind import gust_filter
-from shipgym.sea.wind_coefficients import (
-    coefficient_names,
-)
+from shipgym.sea.wind_coefficients import BLENDERMANN
 
 AREAS = {
     "length_overall": 180.0,
@@ -40,7 +38,9 @@ def test_blendermann_at_30_degrees_worked_by_hand():
     assert yaw == pytest.approx(sway * 180.0 * (-4.0 / 180.0 + 0.18 * np.pi / 3))
 
 
-@pytest.mark.parametrize("coefficients", coefficient_names())
+@pytest.mark.parametrize(
+    "coefficients", ["blendermann", *(f"blendermann-{ship}" for ship in BLENDERMANN)]
+)
 def test_wind_pushes_to_lee_and_its_mirror_image_the_other_way(coefficients):
     curves = wind_curves(S175, coefficients)
     mirror = -np.arange(len(curves.X))
