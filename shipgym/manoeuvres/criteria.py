@@ -202,11 +202,13 @@ class Criterion:
         """Index by the model and by trials, its limit and the verdict."""
         if not self.sides:
             return self.remark
-        measured = self.worse_measured
         found = f"{self.drawn}"
+        measured = self.worse_measured
         if measured is not None:
             found += f", measured {measured}"
-        limit = f"limit {self.limit:.4g} {self.unit}"
+
+        unit = self.unit
+        limit = f"limit {self.limit:.4g} {unit}"
         return f"{found}; {limit}: {self.verdict}"
 
     @property

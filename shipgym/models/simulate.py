@@ -136,7 +136,8 @@ def checked_orders(model: ManoeuvringModel, commands: ArrayLike) -> Floats:
     orders = np.asarray(commands, dtype=float)
     names = model.command_names
     n = len(names)
-    if orders.ndim != 2 or orders.shape[1] != n or len(orders) < 2:
+    is_table = orders.ndim == 2 and orders.shape[1] == n
+    if not is_table or len(orders) < 2:
         listed = ", ".join(names)
         raise InputError(
             f"commands: expected shape (n_steps, {n}) for {listed},"

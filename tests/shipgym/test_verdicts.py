@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from shipgym.trials.sensors import Sensors
 
-from shipgym import InputError, Sensors, UnstableModelError, load_model
+from shipgym import InputError, UnstableModelError, load_model
 from shipgym.manoeuvres import (
     Criterion,
     IndexInterval,
