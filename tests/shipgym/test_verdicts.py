@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shipgym.trials.sensors import Sensors
+from sensors import Sensors
 
 from shipgym import InputError, UnstableModelError, load_model
 from shipgym.manoeuvres import (
