@@ -311,5 +311,5 @@ def check_array(
         fits = all(length in (None, size) for length, size in sizes)
     if not fits:
         lengths = " x ".join("any" if one is None else str(one) for one in shape)
-        raise unexpected(where, f"a list of numbers, {lengths}", value)
+        raise unexpected(where, f"a list of numbers, size {lengths}", value)
     return check_finite(array, where)

@@ -87,7 +87,7 @@ BAD_FILES = [
     (
         "pid",
         {"observation_scales": SCALES[:5]},
-        "scales: expected a list of numbers, 8",
+        "scales: expected a list of numbers, size 8",
     ),
     ("pid", {"observation_scales": [*SCALES[:7], -1.0]}, "scales: 'heading_error_int"),
     ("lqg", {"arrays__input": [1.0]}, "arrays: expected .* of 3 or 5 states"),

@@ -246,7 +246,7 @@ def test_a_checkpoint_runs_no_code(what, tmp_path):
 
     torch = pytest.importorskip("torch")
     plan = make_plan("ppo", settings={"total_steps": 1})
-    begin_folder(tmp_path / "run", plan, "shipgym train")
+    begin_folder(tmp_path / "run", plan)
     torch.save({"run": Evil()}, tmp_path / "run" / "checkpoint.pt")
     from agents.training.training import train
 
