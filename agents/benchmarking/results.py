@@ -96,6 +96,8 @@ class BenchmarkResult:
         """
         check_choice(controller, self.summary["controllers"], "controller")
         check_choice(task, self.tasks, "task")
+        check_choice(name, list(self.episodes.columns), "figure")
+        check_choice(on, set(self.episodes["set"]), "set")
         own = self.episodes.query("controller == @controller and task == @task")
         by_run = own[own["set"] == on].pivot(index="run", columns="seed", values=name)
         figures: Floats = by_run.to_numpy(np.float64)

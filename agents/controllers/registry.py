@@ -62,16 +62,26 @@ def register_controller(controller: type[C]) -> type[C]:
         raise InputError(
             f"{where}: {name}.kind: expected a name such as 'my-lq', got '{kind}'"
         )
-    own = f"{controller.__module__}:{controller.__qualname__}"
-    home = _HOMES.get(kind, own)
-    if home != own:
+    if not callable(getattr(controller, "from_model", None)):
+        raise InputError(
+            f"{where}: {name}: expected a class method 'from_model(model, *, dt=None,"
+            " ...)', got none"
+        )
+    other = _HOMES.get(kind)
+    if kind in _REGISTERED:
+        other = _home(_REGISTERED[kind])
+    if other not in (None, _home(controller)):
         raise InputError(
             f"{where}: {name}.kind: expected one that is free, got '{kind}', which is"
-            f" that of {home}"
+            f" that of {other}"
         )
     if kind not in _HOMES:
         _REGISTERED[kind] = controller
     return controller
+
+
+def _home(controller: type[Controller]) -> str:
+    return f"{controller.__module__}:{controller.__qualname__}"
 
 
 def controller_kinds() -> tuple[str, ...]:

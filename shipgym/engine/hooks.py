@@ -79,9 +79,7 @@ encounter_frequency = given  # (motion, sea, parameters) -> rad/s; 0 in calm wat
 measure = given
 readings = given
 
-# The task (interface: `shipgym.tasks.contract`). `task_step`, `observe` and `due` are
-# given tile and lane behind their five arguments, and take from them what else they
-# name (`shipgym.engine.extra_arguments`).
+# The task (interface: `shipgym.tasks.contract`)
 task_begin = given_and_called
 task_step = given
 observe = given

@@ -183,7 +183,12 @@ def _read_draws(
     rows = fields.get("draws")
     if rows is None:
         return None
-    return check_array(rows, (None, len(names)), where)
+    if fields.get("covariance") is None:
+        raise unexpected(where, "none without their covariance", rows)
+    draws = check_array(rows, (None, len(names)), where)
+    if len(draws) < 2:
+        raise unexpected(where, "two rows at least", rows)
+    return draws
 
 
 def _read_covariance(value: Any, n: int, where: str) -> Floats:

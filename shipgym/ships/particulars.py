@@ -17,6 +17,7 @@ from shipgym.checks import (
     check_text,
     keep_numbers,
     placed,
+    quoted,
     unexpected,
 )
 from shipgym.constants import SEA_WATER
@@ -135,7 +136,7 @@ class Particulars(Mapping[str, Any]):
         given = {
             name: value
             for name, value in self.items()
-            if value is not None and name not in names
+            if value is not None and (name == "length" or name not in names)
         }
         check_together(given)
 
@@ -165,6 +166,12 @@ class Particulars(Mapping[str, Any]):
         table = dict(check_table(mapping, where, known, ("length",)))
         added = table.pop("added_mass", None) or {}
         check_table(added, f"{where} added_mass", ADDED_MASSES)
+        twice = table.keys() & added.keys()
+        if twice:
+            raise InputError(
+                f"{where} added_mass: expected each value in one place, got"
+                f" {quoted(sorted(twice))} twice"
+            )
         with placed(where, " "):
             return cls(**(table | added))
 

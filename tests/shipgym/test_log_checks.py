@@ -1,11 +1,14 @@
 """What a log says is checked, put right where that is asked for, or refused."""
 
 import math
+import shutil
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from shipgym import InputError, ShipFile, Trial
+from shipgym import InputError, ShipFile, Trial, example_ship
 from tests.shipgym.one_zigzag import sailed
 
 NAN, DEGREE = math.nan, math.pi / 180.0
@@ -254,3 +257,18 @@ def test_time_that_stands_still_or_goes_back_is_refused(tmp_path):
     ):
         path = written(tmp_path / "run.csv", t=np.array(t), u=np.ones(len(t)))
         assert message in refusal(path)
+
+
+@pytest.mark.parametrize("factor", [3.28, 100.0, 1e-3])
+def test_positions_in_a_wrong_unit_are_refused(factor, tmp_path):
+    """In feet, cm and km: no current and no unit of speed explains it."""
+    folder = tmp_path / "mariner"
+    shutil.copytree(Path(example_ship()).parent, folder)
+    path = folder / "zigzag_20_20.csv"
+    log = pd.read_csv(path)
+    log[["gnss_north_m", "gnss_east_m"]] *= factor
+    log.to_csv(path, index=False)
+    with pytest.raises(
+        InputError, match=r"positions that change .* likely a wrong unit"
+    ):
+        ShipFile.load(folder / "ship.toml").trials()

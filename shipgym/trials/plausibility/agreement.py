@@ -110,11 +110,12 @@ def check_velocity(log: Log, frame: str, locator: Locator) -> None:
     heading = np.exp(1j * channels["psi"])
     position = channels["x"] + 1j * channels["y"]
     over_ground = {"body": velocity * heading, "earth": velocity}
-    misfits = {}
+    misfits, told = {}, {}
     for name, one in over_ground.items():
         sailed = integral(log.t, one)
         _, moved, expected = changes(log.t, 10.0, position, sailed)
         misfits[name] = np.linalg.norm(moved - expected)
+        told[name] = expected
 
     declared = misfits.pop(frame)
     ((other, misfit),) = misfits.items()
@@ -129,6 +130,30 @@ def check_velocity(log: Log, frame: str, locator: Locator) -> None:
             f' velocity_frame = "{other}"',
             [("velocity_frame", other)],
         )
+    _check_size(moved, told[frame], locator)
+
+
+def _check_size(
+    moved: npt.NDArray[np.complex128],
+    expected: npt.NDArray[np.complex128],
+    locator: Locator,
+) -> None:
+    """Refuse positions that follow the velocities, but in another size.
+
+    Both are changes of position in some windows, m: north and, imaginary, east.
+    """
+    squared = float(np.vdot(expected, expected).real)
+    gain = complex(np.vdot(expected, moved)) / max(squared, 1e-300)
+    misfit = np.linalg.norm(moved - gain * expected)
+    follows = misfit < 0.2 * np.linalg.norm(moved)
+    if not follows or 0.55 < abs(gain) < 1.8:
+        return
+    x, u = (locator.columns[channel].name for channel in "xu")
+    raise InputError(
+        f"{locator.path}: expected positions ('{x}') and velocities ('{u}') to agree,"
+        f" got positions that change {abs(gain):.3g} times as fast as the velocities"
+        " say; likely a wrong unit of one of them or of time, declare it"
+    )
 
 
 _SLOWEST = 0.3  # m/s over ground, of any manoeuvre
