@@ -9,7 +9,8 @@ import emcee
 import numpy as np
 
 from identification.arrays import rounded
-from identification.judging.model_error import FEWEST_TRIALS, holds_turn, model_error
+from identification.judging.hard_turn import holds_turn
+from identification.judging.model_error import FEWEST_TRIALS, model_error
 from identification.judging.uncertainty import Uncertainty
 from identification.models.sailed import (
     CoefficientPrior,

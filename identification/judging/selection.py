@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import root_mean_square
-from identification.judging.model_error import hardest
+from identification.judging.hard_turn import hardest
 from identification.models.sailed import least_scales
 from identification.samples.prediction import predict
 from identification.samples.preprocess import noise_level

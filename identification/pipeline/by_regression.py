@@ -14,10 +14,9 @@ from identification.estimators.covariance import (
 )
 from identification.estimators.linear import Estimators
 from identification.judging.diagnostics import diagnose
+from identification.judging.hard_turn import Without, beyond_trials
 from identification.judging.model_error import (
     FEWEST_TRIALS,
-    Without,
-    beyond_trials,
     model_error,
     with_sound_draws,
 )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.judging.model_error import (
+from identification.judging.hard_turn import (
     beyond_trials,
     holds_turn,
 )
