@@ -223,12 +223,7 @@ class Weather:
         current : Current, optional
         """
         own = "; for another sea give Weather(wind=Wind(...), waves=Waves(...))"
-        check_choice(
-            name,
-            ("calm", *SEA_STATES),
-            "sea state",
-            own,
-        )
+        check_choice(name, ("calm", *SEA_STATES), "sea state", own)
         if name == "calm":
             return cls(current=current, name=name)
         height, period, knots = SEA_STATES[name]

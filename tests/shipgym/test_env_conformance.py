@@ -165,7 +165,7 @@ def test_a_step_before_the_reset_or_after_the_end_is_refused(name):
         ({"sea": 3}, "sea: expected .* got 3"),
         (
             {"sea": ["calm", "rugh"]},
-            "sea: expected .* got 'rugh'.*Did you mean 'rough'",
+            "sea state: expected .* got 'rugh'.*Did you mean 'rough'",
         ),
         ({"action": "ruder"}, "action: expected.*Did you mean 'rudder'"),
         (
