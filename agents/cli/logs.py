@@ -10,12 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Argument, Exit, Option
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from shipgym.trials.guesses import ColumnGuess, RudderSide, TrialGuess
-
-_STEERING = frozenset({"delta", "delta_command"})
-_TURNING = frozenset({"psi", "r"})
 
 
 def new_ship_command(
@@ -165,15 +160,6 @@ def _rudder_side(guessed: list[TrialGuess]) -> RudderSide | None:
     return next(iter([*known, *sides]), None)
 
 
-def _is_whole(*guessed: TrialGuess) -> bool:
-    """Return whether logs have rudder and heading, by their columns or messages."""
-    channels: set[str] = set()
-    for guess in guessed:
-        channels |= {one.channel for one in guess.columns}
-        channels.update(guess.trial.channels if guess.trial is not None else ())
-    return bool(channels & _STEERING and channels & _TURNING)
-
-
 def _to_decide(
     guessed: list[TrialGuess], side: RudderSide | None, *, needs_speed: bool
 ) -> list[str]:
@@ -194,7 +180,7 @@ def _entry(
     """A log for the template of the ship file."""
     of_trial = (one.choices for one in guess.decisions if one.section == "trials")
     return {
-        "file": _toml_paths(guess.paths, folder),
+        "file": _toml_path(guess.table.path, folder),
         "columns": [] if shared else guess.columns,
         "cut": _cut(guess),
         "decision": next(of_trial, None),
@@ -221,10 +207,7 @@ def _cut(guess: TrialGuess) -> str:
 
 
 def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
-    """Logs read with guessed columns; the first has to be a log.
-
-    Files of which none steers and turns, but which do together, are one log.
-    """
+    """Logs read with guessed columns; the first has to be a log."""
     from agents.cli.terminal import warn
     from shipgym.errors import InputError
     from shipgym.trials.guesses import guess_trial
@@ -236,10 +219,6 @@ def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
             guessed.append(guess_trial(log))
         except InputError as error:
             warn(f"{error}; left out of the ship file")
-    if not any(map(_is_whole, guessed)) and _is_whole(*guessed):
-        joined = guess_trial(*(one.paths[0] for one in guessed))
-        if joined.trial is not None:
-            return [joined]
     return guessed
 
 
@@ -252,11 +231,9 @@ def _service_speed(guessed: list[TrialGuess]) -> float | None:
     return max(speeds, default=None)
 
 
-def _toml_paths(paths: Sequence[Path], folder: Path) -> str:
-    """Paths relative to a folder: a text of TOML, or a list of several."""
-    relative = [os.path.relpath(path, folder) for path in paths]
-    one_or_all = relative if len(relative) > 1 else relative[0]
-    return json.dumps(one_or_all, ensure_ascii=False)
+def _toml_path(path: Path, folder: Path) -> str:
+    """A path relative to a folder, as a text of TOML."""
+    return json.dumps(os.path.relpath(path, folder), ensure_ascii=False)
 
 
 def look_command(

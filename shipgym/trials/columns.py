@@ -31,11 +31,10 @@ class Column:
     neutral: float = 0.0  # number of a steering command that steers straight
     full: float | None = None  # change of the command that counts as 35 deg of rudder
     quaternion: tuple[str, ...] | None = None  # columns of x, y and z, beside that of w
-    file: str | None = None  # of several that are one log, where more have the column
 
     @property
     def extra(self) -> dict[str, Any]:
-        """What is declared of the column beside its name, its unit and its file."""
+        """What is declared of the column beside its name and its unit."""
         keys = ("date", "minus", "neutral", "full", "quaternion")
         return {key: getattr(self, key) for key in keys if getattr(self, key)}
 
@@ -114,9 +113,8 @@ def parse_columns(
 ) -> dict[str, Column]:
     """Check a table of columns by channel.
 
-    Each entry is the name of a column or ``{"column": name, "unit": unit}``, with
-    ``"file"``, its name, where several files of one log have that column. That of the
-    time may also have ``"date"``, the column of the date, that of the heading
+    Each entry is the name of a column or ``{"column": name, "unit": unit}``. That of
+    the time may also have ``"date"``, the column of the date, that of the heading
     ``"quaternion"``, the columns of x, y and z beside that of w, that of the
     rudder ``"full"``, ``"neutral"`` and ``"minus"``, which make a steering command.
     `where` begins the messages. Raises InputError for an unknown channel, key or unit,
@@ -128,7 +126,7 @@ def parse_columns(
         check_channel(channel, where)
         column = _parse_column(channel, entry, f"{where} {channel}")
         for other, known in parsed.items():
-            if (known.name, known.file) == (column.name, column.file):
+            if known.name == column.name:
                 raise InputError(
                     f"{where}: expected each column once, got '{column.name}' for"
                     f" {other} and {channel}; name the column of each"
@@ -139,7 +137,7 @@ def parse_columns(
 
 def _parse_column(channel: str, entry: Any, where: str) -> Column:
     fields = dict(entry) if isinstance(entry, Mapping) else {"column": entry}
-    check_keys(fields, ["column", "unit", "file", *_KEYS.get(channel, [])], where)
+    check_keys(fields, ["column", "unit", *_KEYS.get(channel, [])], where)
     name = fields.pop("column", None)
     if not isinstance(name, str):
         raise InputError(
@@ -174,13 +172,12 @@ def _parse_column(channel: str, entry: Any, where: str) -> Column:
 
 
 def choose_columns(
-    table: LogTable, columns: Mapping[str, Column] | None, *, part: bool = False
+    table: LogTable, columns: Mapping[str, Column] | None
 ) -> dict[str, Column]:
     """Columns to read from a file by channel, each with its unit, ``t`` first.
 
     The time is column "t" where it is not named; None stands for every column that is
-    named like a channel. Of a `part` of a log, columns that are not there are left out;
-    else they are an InputError.
+    named like a channel.
     """
     channels = quoted(QUANTITIES)
     if columns is None:
@@ -193,10 +190,8 @@ def choose_columns(
             )
     chosen = {}
     for channel, column in {"t": Column("t"), **columns}.items():
-        is_here = column.name in table.cells and column.file in (None, table.path.name)
-        if is_here or not part or channel == "t":
-            known_unit = table.units.get(column.name, si_unit(channel))
-            chosen[channel] = replace(column, unit=column.unit or known_unit)
+        known_unit = table.units.get(column.name, si_unit(channel))
+        chosen[channel] = replace(column, unit=column.unit or known_unit)
     if len(chosen) == 1:
         raise InputError(
             f"{table.path}: columns: expected some of {channels}, got time alone"

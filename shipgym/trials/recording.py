@@ -70,15 +70,13 @@ def read_recording(
     table: LogTable,
     columns: Mapping[str, Column] | None,
     repair: str | None,
-    *,
-    part: bool = False,
 ) -> Recording:
     """Read the chosen columns of a table, checked and, if asked for, repaired.
 
-    `columns` and `part` are as :func:`.columns.choose_columns` takes them. Anything
-    wrong with a file is an InputError that names line, column, value and remedy.
+    `columns` are as :func:`.columns.choose_columns` takes them. Anything wrong with a
+    file is an InputError that names line, column, value and remedy.
     """
-    chosen = choose_columns(table, columns, part=part)
+    chosen = choose_columns(table, columns)
     if ("lat" in chosen) != ("lon" in chosen):
         alone = "lat" if "lat" in chosen else "lon"
         raise InputError(

@@ -28,7 +28,7 @@ from shipgym.trials.cuts import check_cut
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import USES, Trial, check_kind, cut_trials, trial_of
-from shipgym.trials.trial_import import import_tables, lacking
+from shipgym.trials.trial_import import import_table, lacking
 
 _CONVENTIONS = ("rudder_positive", "velocity_frame", "frame", "origin", "repair")
 _KEYS = ("file", "kind", "use", "columns", "cut", "sensors", *_CONVENTIONS)
@@ -41,9 +41,9 @@ class TrialEntry:
     Attributes
     ----------
     file : str
-        As written, of several joined by " + "; the trial's name.
-    paths : tuple of Path
-        Of the file, or of the files that were logged at the same time.
+        As written; the trial's name.
+    path : Path
+        Of the file.
     use : str
         What the trial is for.
     kind : str or None
@@ -59,7 +59,7 @@ class TrialEntry:
     """
 
     file: str
-    paths: tuple[Path, ...]
+    path: Path
     use: str
     kind: str | None
     cut: Any
@@ -88,7 +88,7 @@ def read_entries(
     words = check_table(data.get("conventions", {}), where, _CONVENTIONS)
     Conventions(**words, xg=ship.xg, where=where)
     Installation.from_mapping(sensors, f"{path}: [sensors]")
-    entries: dict[tuple[str, ...], TrialEntry] = {}
+    entries: dict[tuple[str, str], TrialEntry] = {}
     for number, table in enumerate(tables, start=1):
         where = f"{path}: [[trials]] {number}"
         check_table(table, where, _KEYS)
@@ -111,7 +111,7 @@ def read_entries(
                 ),
             ),
         )
-        part = (*map(os.path.normpath, entry.paths), str(entry.cut))
+        part = os.path.normpath(entry.path), str(entry.cut)
         if part in entries:
             raise InputError(
                 f"{where} file: expected each file once, got '{entry.file}' again"
@@ -132,25 +132,26 @@ def _read_entry(
     columns: Mapping[str, Column],
     conventions: Conventions,
 ) -> TrialEntry:
-    files = table.get("file", [])
-    if not isinstance(files, list):
-        files = [files]
-    if not files:
+    if "file" not in table:
         raise InputError(f'{where}: expected file = "run.csv", got no file')
-    files = [check_text(file, f"{where} file") for file in files]
-    paths = tuple(folder / file for file in files)
+    if isinstance(table["file"], list):
+        raise InputError(
+            f"{where} file: expected one file, got a list; join files of one time by"
+            " their clocks, as pandas.merge_asof does"
+        )
+    file = check_text(table["file"], f"{where} file")
+    path = folder / file
     use = check_choice(table.get("use", "fit"), USES, f"{where} use")
     if use != "skip":
         with placed(f"{where} file"):
-            for path in paths:
-                check_readable(path, "CSV file")
+            check_readable(path, "CSV file")
     if "kind" in table:
         check_kind(table["kind"], f"{where} kind")
     if "cut" in table:
         check_cut(table["cut"], where)
     return TrialEntry(
-        file=" + ".join(files),
-        paths=paths,
+        file=file,
+        path=path,
         use=use,
         kind=table.get("kind"),
         cut=table.get("cut"),
@@ -284,13 +285,13 @@ class ShipFile:
             "length": self.particulars.length,
         }
         with placed(entry.where):
-            tables = [read_log(path) for path in entry.paths]
-            log = import_tables(tables, entry.columns, entry.conventions)
+            table = read_log(entry.path)
+            log = import_table(table, entry.columns, entry.conventions)
             if entry.cut is None:
                 trials = [trial_of(log, entry.file, **facts)]
             else:
                 trials = cut_trials(entry.cut, log, entry.file, entry.where, **facts)
-        where = f"{entry.where}: {entry.paths[0]}"
+        where = f"{entry.where}: {entry.path}"
         for trial in trials:
             check_scale(trial, self.particulars, where)
         return trials

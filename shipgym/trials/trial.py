@@ -33,7 +33,7 @@ from shipgym.trials.readers.frames import read_frame
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.resampling import FEWEST_SAMPLES, Log
-from shipgym.trials.trial_import import import_tables
+from shipgym.trials.trial_import import import_table
 from shipgym.trials.units import (
     CHANNELS,
     DEGREE,
@@ -324,7 +324,7 @@ class Trial:
         )
         table = read_log(path)
         chosen = None if columns is None else parse_columns(columns, f"{where} columns")
-        log = import_tables([table], chosen, conventions)
+        log = import_table(table, chosen, conventions)
         own_name = table.path.name if name is None else name
         return trial_of(log, own_name, kind=kind, use=use, length=length)
 

@@ -1,13 +1,9 @@
-"""Conversion of the tables of a log to channels in SI units, at midship."""
+"""Conversion of the table of a log to channels in SI units, at midship."""
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 
-import numpy as np
-
-from shipgym.checks import quoted
-from shipgym.errors import InputError
-from shipgym.trials.columns import Column
+from shipgym.trials.columns import Column, Locator
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.midship import to_project_conventions
 from shipgym.trials.plausibility.agreement import (
@@ -20,7 +16,7 @@ from shipgym.trials.plausibility.agreement import (
 from shipgym.trials.plausibility.values import check_rudder_unit, frozen_heading
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.recording import Recording, read_recording
-from shipgym.trials.resampling import Log, Signal, Signals, on_one_clock
+from shipgym.trials.resampling import Log, Signals, on_one_clock
 from shipgym.trials.rudder_sign import check_rudder_side
 from shipgym.trials.units import QUANTITIES
 
@@ -46,42 +42,34 @@ _MAGNETIC = (
 )
 
 
-def import_tables(
-    tables: Sequence[LogTable],
+def import_table(
+    table: LogTable,
     columns: Mapping[str, Column] | None,
     conventions: Conventions,
 ) -> Log:
-    """Read channels from the tables of one log, as a rule one.
+    """Read channels from the table of a log.
 
     Without columns every one is read that is named like a channel. The channels have
     the project's signs and are in the body frame, at midship. Anything wrong with a
     file is an InputError that names line, column, value and remedy.
     """
-    is_part = len(tables) > 1
-    recordings = [
-        read_recording(table, columns, conventions.repair, part=is_part)
-        for table in tables
-    ]
-    first, *others = recordings
-    signals = dict(first.signals)
-    for other in others:
-        signals |= _on_first_clock(other, first, signals)
+    recording = read_recording(table, columns, conventions.repair)
+    signals = dict(recording.signals)
+    has_positions = "lat" in recording.locator.columns
     if conventions.rudder_positive == "port":
         for name in signals.keys() & {"delta", "delta_command"}:
             _turn(signals, name)
     if conventions.frame == "enu":
-        _turn_frame(signals, recordings, conventions.velocity_frame)
+        _turn_frame(signals, conventions.velocity_frame, has_positions=has_positions)
 
-    log = on_one_clock(signals, first.locator.path)
-    remarks = _check_channels(log, recordings, conventions)
-    notes = [note for one in recordings for note in one.notes]
-    log.magnetic = any(one.is_magnetic for one in recordings)
-    log.magnetic &= conventions.installation.heading_offset == 0.0
-    if log.magnetic:
-        notes.append(_MAGNETIC)
-    log.notes = notes + log.notes + remarks
+    log = on_one_clock(signals, recording.locator.path)
+    remarks = _check_channels(log, recording.locator, conventions)
+    has_offset = conventions.installation.heading_offset != 0.0
+    log.magnetic = recording.is_magnetic and not has_offset
+    magnetic = [_MAGNETIC] if log.magnetic else []
+    log.notes = [*recording.notes, *magnetic, *log.notes, *remarks]
     to_project_conventions(log, conventions)
-    _complete(log, recordings)
+    _complete(log, recording)
     return log
 
 
@@ -94,84 +82,41 @@ def lacking(known: Collection[str]) -> list[str]:
     ]
 
 
-def _on_first_clock(other: Recording, first: Recording, known: Signals) -> Signals:
-    """Channels of another file of a log on the clock of the first one.
-
-    Raises InputError for channels that are known already, and for other times.
-    """
-    path = other.locator.table.path
-    repeated = known.keys() & other.signals.keys()
-    if repeated:
-        names = quoted(sorted(repeated))
-        raise InputError(
-            f"{path}: expected each channel in one file of this log, got"
-            f" {names} again; name the file of the one to read: {{ column = ..., file ="
-            f' "{path.name}" }}'
-        )
-
-    shift = (other.start or 0.0) - (first.start or 0.0)
-    moved = {
-        name: Signal(t + shift, values) for name, (t, values) in other.signals.items()
-    }
-    begin, end = _span(known)
-    other_begin, other_end = _span(moved)
-    if other_begin >= end or other_end <= begin:
-        raise InputError(
-            f"{path}: expected a file of the same time as the other of this log, got"
-            f" one that begins {other_begin - begin:.6g} s after it and does not"
-            " overlap with it; name files that were written at the same time, by clocks"
-            " of one zone"
-        )
-    return moved
-
-
-def _span(signals: Signals) -> tuple[float, float]:
-    """First and last time of signals, s."""
-    times = np.concatenate([signal.t for signal in signals.values()])
-    return float(times.min()), float(times.max())
-
-
 def _turn(signals: Signals, name: str, zero: float = 0.0) -> None:
     """Let a channel count to the other side, from another zero."""
     signals[name] = signals[name]._replace(values=zero - signals[name].values)
 
 
-def _turn_frame(
-    signals: Signals, recordings: Sequence[Recording], velocity_frame: str
-) -> None:
+def _turn_frame(signals: Signals, velocity_frame: str, *, has_positions: bool) -> None:
     """Make angles that count from east to port those from north to starboard.
 
-    As ROS has them: x east and y north, body forward and to port.
+    As ROS has them: x east and y north, body forward and to port. Latitudes and
+    longitudes became x and y as they should be.
     """
     in_body = velocity_frame == "body"
     for name in signals.keys() & {"psi", "r", "Y", "N", *(["v"] if in_body else [])}:
         _turn(signals, name, 0.5 * math.pi if name == "psi" else 0.0)
     pairs = [] if in_body else [("u", "v")]
-    if not any("lat" in one.locator.columns for one in recordings):
+    if not has_positions:
         pairs.append(("x", "y"))
     for east, north in pairs:
         if {east, north} <= signals.keys():
             signals[east], signals[north] = signals[north], signals[east]
 
 
-def _check_channels(
-    log: Log, recordings: Sequence[Recording], conventions: Conventions
-) -> list[str]:
+def _check_channels(log: Log, locator: Locator, conventions: Conventions) -> list[str]:
     """Refuse impossible and contradictory channels; remarks on what is odd."""
-    locator = recordings[0].locator
     remarks = lacking(log.channels)
     remarks += frozen_heading(log)
     remarks += check_steps(log.t, locator)
-    has_positions = any("lat" in one.locator.columns for one in recordings)
-    if has_positions or log.has("ground_north"):
+    if "lat" in locator.columns or log.has("ground_north"):
         check_over_ground(log, conventions, locator)
     tells_speed = log.has("x", "y") or log.has("ground_north")
     tells_turning = log.has("psi") or log.has("r")
-    for one in recordings:
-        if tells_speed:
-            check_speed_units(log, one.locator)
-        if tells_turning:
-            check_rudder_unit(log, one.locator)
+    if tells_speed:
+        check_speed_units(log, locator)
+    if tells_turning:
+        check_rudder_unit(log, locator)
     if log.has("psi", "r"):
         check_yaw_rate(log, locator)
     if log.has("x", "y", "psi", "u", "v"):
@@ -180,17 +125,12 @@ def _check_channels(
     return remarks
 
 
-def _complete(
-    log: Log,
-    recordings: Sequence[Recording],
-) -> None:
+def _complete(log: Log, recording: Recording) -> None:
     """Order the channels, and add the clock and the counts of values filled in."""
     log.channels = {
         name: log.channels[name] for name in QUANTITIES if name in log.channels
     }
-    for recording in recordings:
-        for name, count in recording.filled.items():
-            if count and name in log.channels:
-                log.repaired[name] = count
-
-    log.start = recordings[0].start
+    for name, count in recording.filled.items():
+        if count and name in log.channels:
+            log.repaired[name] = count
+    log.start = recording.start

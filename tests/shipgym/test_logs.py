@@ -7,8 +7,7 @@ import pandas as pd
 import pytest
 from scipy.io import savemat
 
-from shipgym import ShipFile, Trial
-from shipgym.errors import InputError
+from shipgym import Trial
 from tests.shipgym.one_zigzag import SPEED, sailed
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
@@ -70,18 +69,3 @@ def test_the_real_log_is_read_and_says_that_it_has_no_rudder():
     notes = " ".join(trial.notes)
     assert "no rudder angle in this log: without rudder nothing" in notes
     assert "set and drift" in notes
-
-
-def test_files_that_do_not_overlap_are_no_log(tmp_path):
-    FRAME[["time", "psi", "u", "v"]].to_csv(tmp_path / "gyro.csv", index=False)
-    later = FRAME.assign(time=FRAME["time"] + np.timedelta64(2, "h"))
-    later[["time", "delta"]].to_csv(tmp_path / "rudder.csv", index=False)
-    columns = "\n".join(f'{name} = "{column}"' for name, column in COLUMNS.items())
-    (tmp_path / "ship.toml").write_text(
-        f"[ship]\nlength = 150.0\n[columns]\n{columns}\n[[trials]]\n"
-        'file = ["gyro.csv", "rudder.csv"]\n'
-    )
-    ship_file = ShipFile.load(tmp_path / "ship.toml")
-    with pytest.raises(InputError, match="begins 7200 s after it and does not overlap"):
-        ship_file.trials()
-    assert len(ship_file.faults()) == 1

@@ -6,7 +6,6 @@ import io
 import numpy as np
 import pytest
 
-from shipgym import ShipFile
 from shipgym.errors import InputError
 from shipgym.trials.guesses import guess_trial
 from tests.shipgym.one_zigzag import sailed
@@ -170,18 +169,6 @@ def test_units_that_a_name_or_recorder_defines_are_known(tmp_path):
     assert units == {"t": "ms", "psi": "rad", "r": "rad/s", "delta_command": "rad"}
 
 
-def test_files_of_one_log_are_read_together(tmp_path):
-    columns = plain()
-    part = table(["t", "Heading"], T, columns["Heading"])
-    (tmp_path / "gyro.csv").write_text(part)
-    part = table(["t", "Rudder"], T[::2], columns["Rudder"][::2])
-    (tmp_path / "gear.csv").write_text(part)
-    guess = guess_trial(tmp_path / "gyro.csv", tmp_path / "gear.csv")
-    assert guess.trial.channels.keys() >= {"psi", "delta"}
-    assert turned(guess.trial) < 0.3
-    assert guess.side.side == "starboard"
-
-
 def test_a_parquet_file_that_unpacks_to_too_much_is_refused(tmp_path, monkeypatch):
     arrow = pytest.importorskip("pyarrow")
     parquet = pytest.importorskip("pyarrow.parquet")
@@ -190,32 +177,6 @@ def test_a_parquet_file_that_unpacks_to_too_much_is_refused(tmp_path, monkeypatc
     monkeypatch.setattr("shipgym.trials.readers.text_files.LARGEST_UNPACKED", 2**20)
     with pytest.raises(InputError, match="at most 1048576 bytes unpacked"):
         guess_trial(tmp_path / "log.parquet")
-
-
-def test_of_two_files_with_a_column_the_named_one_is_read(tmp_path):
-    columns = plain()
-    text = table(["t", "yaw", "Rudder"], T, columns["Heading"], columns["Rudder"])
-    (tmp_path / "att.csv").write_text(text)
-    (tmp_path / "nav.csv").write_text(
-        table(["t", "yaw", "u"], T, 0.0 * T, 7.0 + 0.0 * T)
-    )
-    ship_file = tmp_path / "ship.toml"
-    content = """
-[ship]
-length = 100.0
-[columns]
-psi = { column = "yaw", unit = "deg"FILE }
-delta = { column = "Rudder", unit = "deg" }
-u = "u"
-[[trials]]
-file = ["att.csv", "nav.csv"]
-"""
-    ship_file.write_text(content.replace("FILE", ', file = "att.csv"'))
-    (trial,) = ShipFile.load(ship_file).trials()
-    assert turned(trial) < 0.3
-    ship_file.write_text(content.replace("FILE", ""))
-    with pytest.raises(InputError, match="name the file of the one to read"):
-        ShipFile.load(ship_file).trials()
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -200,6 +200,11 @@ def test_trials_can_be_asked_for_by_use(folder):
         ),
         ('file = "a.csv"', "", ": [[trials]] 1: expected file = "),
         (
+            'file = "a.csv"',
+            'file = ["a.csv"]',
+            " file: expected one file, got a list",
+        ),
+        (
             'file = "runs/b.csv"',
             'file = "./a.csv"',
             ": [[trials]] 2 file: expected each file once, got './a.csv'",

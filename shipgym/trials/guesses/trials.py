@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,7 +24,7 @@ from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.rudder_sign import RudderSide, rudder_side
 from shipgym.trials.trial import Trial, trial_of
-from shipgym.trials.trial_import import import_tables
+from shipgym.trials.trial_import import import_table
 from shipgym.trials.units import QUANTITIES, si_unit
 
 #: Channels of which a log without their unit has to be asked about.
@@ -60,8 +59,8 @@ class TrialGuess:
 
     Attributes
     ----------
-    tables : sequence of LogTable
-        The files; several that were written at the same time are one log.
+    table : LogTable
+        The file.
     columns : list of ColumnGuess
         Empty where the reader knows the channels.
     conventions : list of ConventionGuess
@@ -74,7 +73,7 @@ class TrialGuess:
         To which a positive rudder steers; None without one.
     """
 
-    tables: Sequence[LogTable]
+    table: LogTable
     columns: list[ColumnGuess] = field(default_factory=list)
     conventions: list[ConventionGuess] = field(default_factory=list)
     decisions: list[Decision] = field(default_factory=list)
@@ -82,17 +81,11 @@ class TrialGuess:
     side: RudderSide | None = None
 
     @property
-    def paths(self) -> list[Path]:
-        """The files."""
-        return [table.path for table in self.tables]
-
-    @property
     def unused(self) -> list[str]:
         """Columns of which no channel was made."""
         used: set[Any] = {*QUANTITIES} if not self.columns else set()
         used.update(*(guess.names for guess in self.columns))
-        header = [name for table in self.tables for name in table.header]
-        return [name for name in header if name not in used]
+        return [name for name in self.table.header if name not in used]
 
     @property
     def unused_names(self) -> str:
@@ -133,26 +126,23 @@ class TrialGuess:
         """Read the log with the guesses so far."""
         columns = {one.channel: one for one in self.columns}
         words: dict[str, Any] = {one.name: one.value for one in self.conventions}
-        conventions = Conventions(**words, where=f"{self.paths[0]}:")
-        log = import_tables(self.tables, columns or None, conventions)
-        return trial_of(log, " + ".join(path.name for path in self.paths))
+        conventions = Conventions(**words, where=f"{self.table.path}:")
+        log = import_table(self.table, columns or None, conventions)
+        return trial_of(log, self.table.path.name)
 
 
-def guess_trial(path: str | Path, *others: str | Path) -> TrialGuess:
+def guess_trial(path: str | Path) -> TrialGuess:
     """Read a log with guesses; where a check proposes another setting, try that.
 
     A unit given in a column's name is kept unless the positions contradict it. Where a
-    log cannot be read so, that is a decision. With `others`, files that were written at
-    the same time are read as one log, each channel from the file with most rows of it.
-    Raises InputError for a file that is no log.
+    log cannot be read so, that is a decision. Raises InputError for a file that is no
+    log.
     """
-    guess = TrialGuess([read_log(one) for one in (path, *others)])
+    table = read_log(path)
+    guess = TrialGuess(table)
     # some readers name the columns by their channels, with units
-    if not all(
-        table.units and table.cells.keys() <= QUANTITIES.keys()
-        for table in guess.tables
-    ):
-        _guess_tables(guess)
+    if not (table.units and table.cells.keys() <= QUANTITIES.keys()):
+        _guess_table(guess)
     _take_frame(guess)
     guess.trial = _trial_by_proposals(guess)
     if guess.trial is not None and guess.trial.channels.keys().isdisjoint(RUDDERS):
@@ -206,18 +196,11 @@ def _trial_by_proposals(guess: TrialGuess) -> Trial | None:
     return None
 
 
-def _guess_tables(guess: TrialGuess) -> None:
-    """Add columns of all tables by channel, and what is left to decide."""
-    columns: dict[str, ColumnGuess] = {}
-    tables = sorted(guess.tables, key=lambda table: len(table.rows), reverse=True)
-    for table in tables:
-        _check_numbers(table)
-        found = {one.channel: one for one in guess_columns(table)}
-        guess.decisions += _unknown_units(found)
-        for channel, one in found.items():
-            if len(tables) > 1 and channel != "t":
-                one = replace(one, reason=f"{one.reason}; from {table.path.name}")
-            columns.setdefault(channel, one)
+def _guess_table(guess: TrialGuess) -> None:
+    """Add the columns by channel, and what is left to decide."""
+    _check_numbers(guess.table)
+    columns = {one.channel: one for one in guess_columns(guess.table)}
+    guess.decisions += _unknown_units(columns)
     guess.columns = list(columns.values())
     _ask_for_missing(guess)
 
@@ -251,23 +234,22 @@ def _ask_for_missing(guess: TrialGuess) -> None:
 
 def _rudder_by_behaviour(guess: TrialGuess) -> list[Decision]:
     """A decision on a column within 40 that moves before the heading turns."""
-    for table in guess.tables:
-        for name in table.header:
-            values = table.likely_numbers(name)
-            if values is None or name not in guess.unused or not _is_small(values):
-                continue
-            unit = unit_by_size(values, "delta").unit
-            rudder = ColumnGuess(name, unit, channel="delta")
-            columns = [*guess.columns, rudder]
-            candidate = TrialGuess(guess.tables, columns, [*guess.conventions])
-            trial = _trial_by_proposals(candidate)
-            side = _rudder_side(candidate, trial) if trial is not None else None
-            if side is not None and side.side is not None:
-                choices = (
-                    "likely the rudder, as it moves before the heading turns:"
-                    f" {rudder.declaration}"
-                )
-                return [Decision("columns", "delta", choices)]
+    for name in guess.unused:
+        values = guess.table.likely_numbers(name)
+        if values is None or not _is_small(values):
+            continue
+        unit = unit_by_size(values, "delta").unit
+        rudder = ColumnGuess(name, unit, channel="delta")
+        columns = [*guess.columns, rudder]
+        candidate = TrialGuess(guess.table, columns, [*guess.conventions])
+        trial = _trial_by_proposals(candidate)
+        side = _rudder_side(candidate, trial) if trial is not None else None
+        if side is not None and side.side is not None:
+            choices = (
+                "likely the rudder, as it moves before the heading turns:"
+                f" {rudder.declaration}"
+            )
+            return [Decision("columns", "delta", choices)]
     return []
 
 
@@ -283,11 +265,10 @@ def _rudder_side(guess: TrialGuess, trial: Trial) -> RudderSide | None:
     rudder = trial.channels.get("delta", command)
     if "psi" not in trial or rudder is None:
         return None
-    names = {one.name for one in guess.columns if one.channel in RUDDERS}
-    for table in guess.tables:
-        for name in names.intersection(table.header):
-            if number_with_side(table.first_text(name)) is not None:
-                return RudderSide("starboard", "the letters S and P of its values")
+    names = [one.name for one in guess.columns if one.channel in RUDDERS]
+    for name in names:
+        if number_with_side(guess.table.first_text(name)) is not None:
+            return RudderSide("starboard", "the letters S and P of its values")
     found = rudder_side(trial.t, trial["psi"], rudder)
     is_turned = any(one.name == "rudder_positive" for one in guess.conventions)
     return found._replace(side="port") if found.side and is_turned else found
