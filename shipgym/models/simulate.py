@@ -139,9 +139,10 @@ def checked_orders(model: ManoeuvringModel, commands: ArrayLike) -> Floats:
     is_table = orders.ndim == 2 and orders.shape[1] == n
     if not is_table or len(orders) < 2:
         listed = ", ".join(names)
+        shape = orders.shape
         raise InputError(
             f"commands: expected shape (n_steps, {n}) for {listed},"
-            f" with at least 2 steps, got {orders.shape}"
+            f" with at least 2 steps, got {shape}"
         )
     check_units(model, orders)
     return orders

@@ -127,10 +127,10 @@ def _check_channels(log: Log, locator: Locator, conventions: Conventions) -> lis
 
 def _complete(log: Log, recording: Recording) -> None:
     """Order the channels, and add the clock and the counts of values filled in."""
-    log.channels = {
-        name: log.channels[name] for name in QUANTITIES if name in log.channels
-    }
-    for name, count in recording.filled.items():
-        if count and name in log.channels:
+    known = [name for name in QUANTITIES if name in log.channels]
+    log.channels = {name: log.channels[name] for name in known}
+    for name in known:
+        count = recording.filled.get(name, 0)
+        if count:
             log.repaired[name] = count
     log.start = recording.start

@@ -199,8 +199,10 @@ def _trial_by_proposals(guess: TrialGuess) -> Trial | None:
 def _guess_table(guess: TrialGuess) -> None:
     """Add the columns by channel, and what is left to decide."""
     _check_numbers(guess.table)
-    columns = {one.channel: one for one in guess_columns(guess.table)}
-    guess.decisions += _unknown_units(columns)
+    found = guess_columns(guess.table)
+    columns = {one.channel: one for one in found}
+    decisions = _unknown_units(columns)
+    guess.decisions += decisions
     guess.columns = list(columns.values())
     _ask_for_missing(guess)
 

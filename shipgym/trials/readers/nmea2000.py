@@ -132,8 +132,9 @@ def _angle_unit(messages: Iterable[_Message]) -> str:
         for name in ("heading", "cog"):
             value, unit = message.get(name, (None, ""))
             angle = _number(value)
-            if angle is not None and not unit:
-                largest = max(largest, angle)
+            if angle is None or unit:
+                continue
+            largest = max(largest, angle)
     return "rad" if 0.0 < largest < 6.3 else "deg"
 
 
