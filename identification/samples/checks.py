@@ -29,7 +29,6 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
         )
     for trial in trials:
         _check_channels(trial, structure)
-        _check_rudder(trial)
     if structure.has_rudder and all(is_still(trial) for trial in trials):
         _refuse_still(trials[0])
 
@@ -46,18 +45,6 @@ def _check_channels(trial: Trial, structure: Structure) -> None:
             f"trial {trial.name!r}: channel {channel!r} is missing, structure"
             f" {structure.name!r} needs {', '.join(needed)}; name its column, or"
             f' leave the trial out (use = "skip"){hint}'
-        )
-
-
-def _check_rudder(trial: Trial) -> None:
-    """Refuse a rudder beyond 90 deg, as of degrees given for radians in an array."""
-    if "delta" not in trial:
-        return
-    largest = float(np.abs(trial["delta"]).max())
-    if largest > 0.5 * np.pi + 1e-9:
-        raise InputError(
-            f"trial {trial.name!r}: delta: expected radians of at most 1.571 (90 deg),"
-            f" got {largest:.4g}; likely degrees: give numpy.radians(...)"
         )
 
 

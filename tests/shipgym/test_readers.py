@@ -9,7 +9,6 @@ from scipy.io import savemat
 
 from shipgym import InputError, Trial
 
-KNOT = 1852.0 / 3600.0
 CSV = b"t,u\n0,1.5\n1,2.5\n2,3.5\n"
 
 
@@ -180,20 +179,3 @@ def each_second(*texts, count=6):
 def test_a_log_of_few_sentences_is_refused(tmp_path):
     path = nmea_log(tmp_path / "log.nmea", *each_second(count=2))
     assert "got too few" in refusal(path)
-
-
-@pytest.mark.parametrize(
-    ("texts", "speed", "from_deg"),
-    [
-        (["WIMWV,030.0,T,10.0,M,A"], 10.0, 50.0),
-        (["WIMWV,030.0,T,10.0,N,A"], 10.0 * KNOT, 50.0),
-        (["WIMWV,030.0,T,10.0,K,A"], 10.0 / 3.6, 50.0),
-        (["WIMWV,030.0,T,10.0,M,A", "WIMWV,040.0,T,9.0,X,A"], 10.0, 50.0),  # no unit
-        (["WIMWV,340.0,R,15.0,N,A"], 5.0 * KNOT, 0.0),  # less the ship's own 10 kn
-    ],
-)
-def test_a_wind_from_the_bow_is_turned_by_the_heading(texts, speed, from_deg, tmp_path):
-    path = tmp_path / "log.nmea"
-    trial = Trial.from_csv(nmea_log(path, *each_second("HEHDT,20.0,T", *texts)))
-    np.testing.assert_allclose(trial["wind_speed"], speed, atol=1e-9)
-    np.testing.assert_allclose(np.degrees(trial["wind_from"]), from_deg, atol=1e-9)

@@ -4,7 +4,7 @@ The messages are sentences of NMEA 0183, PGNs of NMEA 2000 and deltas of Signal 
 mixed, with or without a time before each.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ from shipgym.errors import InputError
 from shipgym.trials.clock_texts import is_dated
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.readers.message_clock import Clock, log_clock, times_of
-from shipgym.trials.readers.messages import Heard, Value, is_wind
+from shipgym.trials.readers.messages import Heard, Value
 from shipgym.trials.readers.nmea0183 import hear_sentences
 from shipgym.trials.readers.nmea2000 import hear_pgns
 from shipgym.trials.readers.signalk import hear_deltas
@@ -149,35 +149,6 @@ def _choose_heading(tracks: dict[str, Track], notes: list[str]) -> bool:
     return False
 
 
-def _wind_over_ground(
-    winds: Mapping[str, Track], tracks: Mapping[str, Track]
-) -> dict[str, Track]:
-    """Wind over ground from that off the bow; empty where the velocity is missing."""
-    kind = "wind" if {"wind_angle", "wind_speed"} <= winds.keys() else "apparent_wind"
-    needed = {f"{kind}_angle", f"{kind}_speed"}
-    if kind == "apparent_wind":
-        needed |= {"sog", "cog"}
-    if not needed <= {*winds, *tracks}:
-        return {}
-    angle, speed = winds[f"{kind}_angle"], winds[f"{kind}_speed"]
-    bearing = angle.values + _continuous(tracks["psi"]).at(angle.t)
-    if kind == "wind":
-        return {"wind_from": angle._replace(values=bearing), "wind_speed": speed}
-    # complex: north + i east
-    course = _continuous(tracks["cog"]).at(angle.t)
-    own = tracks["sog"].at(angle.t) * np.exp(1j * course)
-    wind = speed.values * np.exp(1j * bearing) - own
-    return {
-        "wind_from": angle._replace(values=np.angle(wind)),
-        "wind_speed": angle._replace(values=np.abs(wind)),
-    }
-
-
-def _continuous(track: Track) -> Track:
-    """An angle without jumps."""
-    return track._replace(values=np.unwrap(track.values))
-
-
 def read_messages(path: Path, content: bytes) -> LogTable:
     """Read a log's channels: SI units, positions in degrees, nan where absent.
 
@@ -203,9 +174,6 @@ def read_messages(path: Path, content: bytes) -> LogTable:
             " before each line, got none; log these too"
         )
     tracks, is_magnetic = _choose_tracks(heard, clock, notes)
-    winds = {name: tracks.pop(name) for name in [*tracks] if is_wind(name)}
-    if winds and "psi" in tracks:
-        tracks |= _wind_over_ground(winds, tracks)
     if not tracks:
         raise InputError(
             f"{path}: expected several values of a ship's motion (RMC, HDT, HDG, ROT,"

@@ -54,11 +54,6 @@ class Value(NamedTuple):
     value: float
 
 
-def is_wind(quantity: str) -> bool:
-    """Return whether it is of a wind from the bow, no channel without the heading."""
-    return quantity.endswith(("wind_angle", "wind_speed"))
-
-
 def port_source(source: str) -> str:
     """Name of the port one of two rudders that a source shows."""
     return f"{source} port"
@@ -81,8 +76,7 @@ class Heard:
         Times that messages give, by source.
     channels : dict
         Values by channel and source, in SI units, positions in degrees. Channels of
-        their own are winds (`is_wind`), ``psi_magnetic`` (a heading by compass) and
-        ``variation``.
+        their own are ``psi_magnetic`` (a heading by compass) and ``variation``.
     stamps : dict of int to str
         Time before a line, by line.
     order : list of tuple

@@ -1,4 +1,4 @@
-"""Sentences of NMEA 0183 in a log, of any talkers: position, motion, rudder and wind.
+"""Sentences of NMEA 0183 in a log, of any talkers: position, motion and rudder.
 
 The sentences stand in `nmea0183.toml`; those without channel and time (AIS, depth,
 satellites) are passed over.
@@ -19,7 +19,6 @@ from shipgym.trials.units import DEGREE, UNITS
 
 _FACTORS = {**UNITS["angle"], **UNITS["angular rate"], **UNITS["speed"]}
 _FACTORS |= UNITS["shaft speed"]
-_SPEED_UNITS = {"N": "knots", "K": "km/h", "M": "m/s"}
 _SIGNS = {"N": 1.0, "S": -1.0, "E": 1.0, "W": -1.0}
 _TIME = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-5]\d(?:\.\d*)?)")
 #: Names of transducers that show a rudder, and that of the port one.
@@ -35,14 +34,12 @@ class _Number(NamedTuple):
     unit: str
     side: int | None = None
     when: Mapping[str, str] = {}
-    must: Mapping[str, str] = {}
 
     def counts(self, fields: Sequence[str]) -> bool:
         """Return whether the letters beside a number say that it counts."""
         has_side = self.side is None or fields[self.side] in _SIGNS
         return has_side and all(
-            fields[int(at)] in letters and (fields[int(at)] or at not in self.must)
-            for at, letters in {**self.when, **self.must}.items()
+            fields[int(at)] in letters for at, letters in self.when.items()
         )
 
 
@@ -183,8 +180,6 @@ def _number(fields: Sequence[str], place: _Number) -> float:
             raise ValueError(f"expected degrees and minutes below 60, got {text}")
         value = degrees + minutes / 60.0
     else:
-        if unit.startswith("@"):
-            unit = _SPEED_UNITS[fields[int(unit[1:])]]
         value *= _FACTORS[unit]
     return value if place.side is None else copysign(value, _SIGNS[fields[place.side]])
 

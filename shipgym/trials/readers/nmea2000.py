@@ -139,7 +139,7 @@ def _angle_unit(messages: Iterable[_Message]) -> str:
 
 
 def _channels(message: _Message, angle_unit: str) -> dict[str, float]:
-    """Channels of a message, SI units; headings and winds by the reference it names."""
+    """Channels of a message, SI units; headings by the reference it names."""
     if _value(message, "cogreference") == "Magnetic":
         return {}
     values = {}
@@ -147,7 +147,7 @@ def _channels(message: _Message, angle_unit: str) -> dict[str, float]:
         value, unit = message.get(name, (None, ""))
         number = _number(value)
         if number is not None:
-            is_speed = channel in ("sog", "stw", "speed")
+            is_speed = channel in ("sog", "stw")
             unit = unit or ("m/s" if is_speed else angle_unit)
             is_place = channel in ("lat", "lon")
             values[channel] = number * (1.0 if is_place else _FACTORS.get(unit, 1.0))
@@ -160,9 +160,4 @@ def _channels(message: _Message, angle_unit: str) -> dict[str, float]:
             if reference == "True"
             else {"psi_magnetic": heading + deviation}
         )
-    angle, speed = values.pop("angle", None), values.pop("speed", None)
-    winds = {"Apparent": "apparent_wind", "True (boat referenced)": "wind"}
-    if angle is not None and speed is not None and reference in winds:
-        wind = winds[reference]
-        values |= {f"{wind}_angle": angle, f"{wind}_speed": speed}
     return values

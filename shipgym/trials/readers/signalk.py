@@ -22,10 +22,6 @@ _PATHS = {
     "navigation.speedThroughWater": "stw",
     "steering.rudderAngle": "delta",
     "steering.rudderAngleTarget": "delta_command",
-    "environment.wind.speedApparent": "apparent_wind_speed",
-    "environment.wind.angleApparent": "apparent_wind_angle",
-    "environment.wind.speedOverGround": "wind_speed",
-    "environment.wind.angleTrueGround": "wind_angle",
 }
 
 
