@@ -100,10 +100,12 @@ class Samples:
 
     def select(self, rows: NDArray[Any]) -> Self:
         """Some of the rows, by mask or index."""
+        features = {q: values[rows] for q, values in self.features.items()}
+        targets = {q: values[rows] for q, values in self.targets.items()}
         return replace(
             self,
-            features={q: values[rows] for q, values in self.features.items()},
-            targets={q: values[rows] for q, values in self.targets.items()},
+            features=features,
+            targets=targets,
             start=self.start[rows],
             duration=self.duration[rows],
             trial=self.trial[rows],

@@ -65,7 +65,8 @@ def without_sentinels(
         if not count:
             continue
         others = np.abs(values[np.isfinite(values) & ~is_number])
-        is_far = others.size and abs(number) / 3.0 > others.max()
+        # a few values do not tell what is far
+        is_far = others.size > 30 and abs(number) / 3.0 > others.max()
         if is_far or abs(number) > largest:
             values = np.where(is_number, np.nan, values)
             words.append(f'{count} values of {number:g} stand for "no value"')
