@@ -1,47 +1,26 @@
-"""Parts of a log that are trials: stretches by the clock, or between quiet rudders."""
+"""Parts of a log that are trials: given stretches, or those between quiet rudders."""
 
 from typing import Any
 
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.checks import shown
+from shipgym.checks import check_array
 from shipgym.errors import InputError
-from shipgym.trials.clock_texts import DAY, clock_text, is_dated, read_clock
 from shipgym.trials.resampling import FEWEST_SAMPLES, Log, usual_step
 from shipgym.trials.units import DEGREE
-
-_EXPECTED = (
-    'expected cut = "rudder", or stretches in seconds or clock time: [[60, 360],'
-    ' ["09:30:00", "09:41:30"]]'
-)
 
 _SHORTEST = 30.0  # s, of a manoeuvre
 
 
 def check_cut(cut: Any, where: str) -> None:
-    """Refuse a cut that is neither "rudder" nor a list of pairs of numbers or texts."""
-    pairs = cut if isinstance(cut, list) and cut else [cut]
-    are_pairs = all(
-        isinstance(pair, list)
-        and len(pair) == 2
-        and all(type(moment) in (int, float, str) for moment in pair)
-        for pair in pairs
-    )
-    if cut != "rudder" and not are_pairs:
-        raise InputError(f"{where} cut: {_EXPECTED}, got {shown(cut)}")
+    """Refuse a cut that is neither "rudder" nor a list of pairs of numbers."""
+    if cut != "rudder":
+        check_array(cut, (None, 2), f'{where} cut (in seconds, if not "rudder")')
 
 
-def cut_log(
-    cut: Any,
-    log: Log,
-    where: str,
-) -> list[slice]:
-    """Samples of each part, in order of time.
-
-    Raises InputError for a part without samples, and for clock times of a log without a
-    clock.
-    """
+def cut_log(cut: Any, log: Log, where: str) -> list[slice]:
+    """Samples of each part, in order of time; InputError for a part without samples."""
     stretches = cut
     if cut == "rudder":
         stretches = active_stretches(log.t, log.channels.get("delta"))
@@ -52,47 +31,17 @@ def cut_log(
             " give the stretches, or read another log"
         )
     parts = []
-    for moments in stretches:
-        first, last = (_seconds(moment, log, where) for moment in moments)
+    for first, last in stretches:
         begin = int(np.searchsorted(log.t, first))
         end = int(np.searchsorted(log.t, last, side="right"))
         if end - begin < FEWEST_SAMPLES:
             raise InputError(
                 f"{where} cut: expected stretches of the log, which goes from"
-                f" {_span(log)}, got {moments[0]} to {moments[1]}, which holds no trial"
+                f" {log.t[0]:g} to {log.t[-1]:g} s, got {first} to {last}, which holds"
+                " no trial"
             )
         parts.append(slice(begin, end))
     return parts
-
-
-def _span(log: Log) -> str:
-    """First and last time of a log, in seconds and by its clock."""
-    ends = log.t[0], log.t[-1]
-    span = " to ".join(f"{one:g}" for one in ends) + " s"
-    if log.start is None:
-        return span
-    return f"{span}, " + " to ".join(clock_text(log.start + one) for one in ends)
-
-
-def _seconds(moment: float | str, log: Log, where: str) -> float:
-    """A moment on the log's time, s; a time of the day is the one next to its start."""
-    if not isinstance(moment, str):
-        return float(moment)
-    try:
-        (seconds,) = read_clock([moment])
-    except ValueError:
-        raise InputError(f"{where} cut: {_EXPECTED}, got {moment!r}") from None
-    if log.start is None:
-        raise InputError(
-            f"{where} cut: expected seconds of the log's time, which has no clock, got"
-            f" {moment!r}"
-        )
-    after = float(seconds) - log.start
-    if is_dated(seconds):
-        return after
-    after %= DAY
-    is_before = after >= log.t[-1] + 0.5 * DAY
-    return after - DAY if is_before else after
 
 
 def runs(t: Floats) -> list[list[float]]:

@@ -45,9 +45,6 @@ class Recording:
         Places of the values in the file.
     filled : dict of str to int
         How many values of a channel were filled in.
-    start : float or None
-        Clock at t = 0, s since 1970 or of the day; None where the time is no
-        clock's.
     notes : list of str
         What was left out, and what was assumed of the values.
     """
@@ -55,7 +52,6 @@ class Recording:
     signals: Signals
     locator: Locator
     filled: Mapping[str, int]
-    start: float | None
     notes: list[str]
 
     @property
@@ -106,7 +102,7 @@ def read_recording(
         filled |= {"x": outliers, "y": outliers}
     if "sog" in signals:
         _make_velocity(signals)
-    return Recording(signals, locator, filled, times.start, notes)
+    return Recording(signals, locator, filled, notes)
 
 
 def _settle_speed(chosen: dict[str, Column]) -> list[str]:

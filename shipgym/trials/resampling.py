@@ -45,8 +45,6 @@ class Log:
         How many values of a channel were filled in.
     over_ground : bool or None
         Whether surge and sway are velocities over ground; None: where they are derived.
-    start : float or None
-        Clock at t = 0 as the file has it, s since 1970 or of the day.
     magnetic : bool
         Whether the heading counts from magnetic north.
     """
@@ -58,7 +56,6 @@ class Log:
     derived: set[str] = field(default_factory=set)
     repaired: dict[str, int] = field(default_factory=dict)
     over_ground: bool | None = None
-    start: float | None = None
     magnetic: bool = False
 
     def needed(self, channel: str, what: str) -> Floats:

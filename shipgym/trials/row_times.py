@@ -36,7 +36,6 @@ class RowTimes(NamedTuple):
 
     t: Floats  # s
     unit: str  # in which messages name them
-    start: float | None  # of the clock at t = 0; None where it is no clock's
     notes: list[str]
 
 
@@ -61,10 +60,10 @@ def read_times(table: LogTable, column: Column) -> RowTimes:
         clock[np.isinf(clock)] = np.nan
     clock = _one_after_another(_spread(clock, notes), notes)
     if is_numeric and column.unit not in _EPOCHS:
-        return RowTimes(clock, column.unit, start=None, notes=notes)
+        return RowTimes(clock, column.unit, notes)
     known = clock[np.isfinite(clock)]
     zero = float(known[0]) if known.size else 0.0
-    return RowTimes(clock - zero, unit="s", start=zero, notes=notes)
+    return RowTimes(clock - zero, "s", notes)
 
 
 def _time_cells(table: LogTable, column: Column) -> list[str]:

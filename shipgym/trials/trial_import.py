@@ -126,11 +126,10 @@ def _check_channels(log: Log, locator: Locator, conventions: Conventions) -> lis
 
 
 def _complete(log: Log, recording: Recording) -> None:
-    """Order the channels, and add the clock and the counts of values filled in."""
+    """Order the channels, and add the counts of values filled in."""
     known = [name for name in QUANTITIES if name in log.channels]
     log.channels = {name: log.channels[name] for name in known}
     for name in known:
         count = recording.filled.get(name, 0)
         if count:
             log.repaired[name] = count
-    log.start = recording.start
