@@ -63,7 +63,10 @@ def _choose_structure(
     elif "structure" in asked and "reference_model" not in asked:
         # one in the ship file belongs to the structure that is named there
         chosen.pop("reference_model", None)
-    if asked.get("structure") in (AUTO, MMG) and "method" not in asked:
+    of_one_method = (AUTO, MMG, GREY_BOX) if "kernel" in chosen else (AUTO, MMG)
+    is_new = not {"structure", "kernel"}.isdisjoint(asked)
+    is_fixed = chosen.get("structure", GREY_BOX) in of_one_method
+    if is_new and is_fixed and "method" not in asked:
         # so does its method
         for name in {name for name in chosen if name.split(".")[0] == "method"}:
             if name not in asked:

@@ -16,7 +16,7 @@ from agents.controllers.controller import (
     Bounds,
     Controller,
 )
-from agents.controllers.helm import HELM
+from agents.controllers.helm import HELM, check_wave
 from agents.controllers.interface import check_names
 from agents.controllers.margins import Margins
 from agents.controllers.registry import controller_class, controller_kinds
@@ -60,19 +60,22 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
     check_names(names, design.observes + more, f"{where}: observation_names")
 
     gain_names = design.gain_names or (*design.feedback, *HELM)
-    gains = dict.fromkeys(gain_names, ANY_NUMBER)
+    gains = {name: Bounds(*HELM.get(name, ANY_NUMBER)) for name in gain_names}
     needed = {name: one for name, one in design.bounds.items() if name not in gains}
     gains |= {name: one for name, one in design.bounds.items() if name in gains}
     rudder = Bounds(-np.pi, np.pi)  # rad
     with placed(where):
         check_table(content["gains"], "gains", gains)
+        numbers = _numbers(content["gains"], gains, "gains")
+        own = _numbers(content["design"], needed, "design")
+        check_wave(numbers.get("wave_period", 0.0), own["dt"])
         return design(
-            gains=_numbers(content["gains"], gains, "gains"),
+            gains=numbers,
             neutral_rudder=_number(content["neutral_rudder"], rudder, "neutral_rudder"),
             neutral_sway=_number(content["neutral_sway"], ANY_NUMBER, "neutral_sway"),
             margins=_margins(content["margins"]),
             observation_scales=read_scales(content["observation_scales"], names),
-            design=_numbers(content["design"], needed, "design"),
+            design=own,
             observation_names=names,
             **read_model(content["model"]),
             **_arrays(content.get("arrays", {}), design.arrays),

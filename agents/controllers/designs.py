@@ -35,11 +35,10 @@ def design(
         `lq_`. Without any the design's own, with a filter for the waves of the task.
     """
     made: Any = controller_class(kind)
-    given = dict(settings or for_sea(made, task.task))
+    interval = task.task.interval(task.ship)
+    given = dict(settings or for_sea(made, task.task, interval))
     if not made.has_autopilot:
-        found: Controller = made.from_model(
-            task.ship, dt=task.task.interval(task.ship), **given
-        )
+        found: Controller = made.from_model(task.ship, dt=interval, **given)
         return found
     if not task.task.follows_path:
         raise no_path(kind, task)
@@ -54,10 +53,13 @@ def design(
     return guide
 
 
-def for_sea(made: Any, task: Task) -> dict[str, float]:
-    """Settings of a class of controllers that follow from the sea of a task."""
+def for_sea(made: Any, task: Task, interval: float) -> dict[str, float]:
+    """Settings of a class of controllers that follow from the sea of a task.
+
+    None for waves that the control `interval`, s, cannot follow.
+    """
     waves = task.weather.waves
-    if waves is None:
+    if waves is None or waves.peak_period <= 2.0 * interval:
         return {}
     if made.has_autopilot:
         return {f"{INNER}wave_period": waves.peak_period}

@@ -13,22 +13,22 @@ import numpy as np
 from agents.controllers.law import Biquad, Helm
 from agents.settings import Settings, Step, setting
 from shipgym import ShipModel
-from shipgym.checks import check_number
+from shipgym.checks import check_number, check_table
 from shipgym.instruments.noise import SEA_TRIAL
 
-#: Gains of the helm in a controller's file.
-HELM = (
-    "rudder_update",
-    "rudder_band",
-    "wave_period",
-    "wave_corner",
-    "schedule",
-    "gear_share",
-    "gear_step",
-)
 LONGEST_WAVE = 60.0  # s, with which a sea is met
 #: Corners of the wave filter that are tried, over the frequency of the waves.
 CORNERS = (0.5, 0.7, 1.0, 1.4, 2.0)
+#: Gains of the helm in a controller's file, least and largest.
+HELM = {
+    "rudder_update": (0.0, 1.0),
+    "rudder_band": (0.0, np.pi),
+    "wave_period": (0.0, LONGEST_WAVE),
+    "wave_corner": (CORNERS[0], CORNERS[-1]),
+    "schedule": (0.0, 1.0),
+    "gear_share": (0.0, 1.0),
+    "gear_step": (0.0, 1e9),
+}
 
 
 @dataclass(frozen=True)
@@ -58,15 +58,9 @@ class HelmSettings(Settings):
         """
         period = self.wave_period
         if period is None:
-            shown = logged(model, "wave_period")
+            shown = logged(model, "wave_period", at_most=LONGEST_WAVE)
             period = shown if shown > 2.0 * dt else 0.0
-        elif period > 0.0:
-            check_number(
-                period,
-                "wave_period",
-                above=2.0 * dt,
-                hint="two control intervals, in s; 0 for no filter",
-            )
+        check_wave(period, dt)
         gear = model.steering
         lag = gear.time_constant
         share = 1.0 - np.exp(-dt / lag) if lag > 0.0 else 1.0
@@ -79,6 +73,13 @@ class HelmSettings(Settings):
             "gear_share": float(share),
             "gear_step": gear.rate * dt,
         }
+
+
+def check_wave(period: float, dt: float) -> None:
+    """Refuse a wave of a period, s, that a control interval of dt cannot follow."""
+    if period != 0.0:
+        hint = "two control intervals, in s; 0 for no filter"
+        check_number(period, "wave_period", above=2.0 * dt, hint=hint)
 
 
 def noise_setting(search: Step | None = None) -> Any:
@@ -102,12 +103,14 @@ def logged_noise(model: ShipModel) -> float:
     return float(np.clip(max(heading, yaw_rate), 1.0, 10.0))
 
 
-def logged(model: ShipModel, *place: str) -> float:
+def logged(model: ShipModel, *place: str, at_most: float = 1e9) -> float:
     """Number in a model's provenance; 0 where there is none."""
     found: Any = model.provenance or {}
+    where = f"model '{model.name}': provenance"
     for name in place:
-        found = found.get(name, {}) if isinstance(found, Mapping) else {}
-    return check_number(found or 0.0, f"provenance.{'.'.join(place)}", at_least=0.0)
+        found = check_table(found, where).get(name) or {}
+        where = f"{where}.{name}"
+    return check_number(found or 0.0, where, at_least=0.0, at_most=at_most)
 
 
 def known(settings: Settings) -> dict[str, float]:

@@ -210,8 +210,11 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
     """
     state = first_state(agent)
     inputs = {name: AUTOPILOT_INPUTS[name] for name in needed_inputs(agent)}
-    if "surge" in inputs:  # where nobody connects it, gains are those of the design
-        inputs["surge"] = inputs["surge"]._replace(start=agent.service_speed)
+    if "surge" in inputs:
+        surge = inputs["surge"]
+        speed = agent.service_speed  # for which the gains are
+        meaning = f"{surge.meaning}; where it is not measured {speed:.4g}"
+        inputs["surge"] = surge._replace(meaning=meaning, start=speed)
     p = bridge_parameters(agent)
     name = checked_name(name or agent.name)
     c = Translator({}, name)

@@ -89,7 +89,8 @@ def get_method(method: str | Any) -> Method:
     have none but that of the structure.
     """
     if isinstance(method, str):
-        method = make_method(check_choice(method, METHODS, "method"))
+        more = ", or 'map' with structure 'mmg'"
+        method = make_method(check_choice(method, METHODS, "method", more))
     if isinstance(method, Refinement):
         start = get_method(TruncatedLSSVM())
         return replace(start, name=Refinement.name, refinement=method)

@@ -226,12 +226,11 @@ def by_kernel(
             "uncertainty: expected 'analytic' with a kernel, got 'posterior'; leave"
             " one of them out"
         )
-    method = name_of(options.table_method)
-    by_lssvm = ("tls-svm", "ls-svm", "rm-svm")
-    if options.structure == GREY_BOX and method not in by_lssvm:
+    method = "ls-svm"
+    if options.structure == GREY_BOX and options.method is not None:
         raise InputError(
             "method: expected none with a kernel on a grey box, which is fitted by"
-            f" LS-SVM, got {method!r}; leave it out"
+            f" LS-SVM, got {name_of(options.method)!r}; leave it out"
         )
     beneath = replace(options, kernel=None)
     problem = pose(trials, beneath)

@@ -17,9 +17,11 @@ from shipgym.checks import (
     bounded,
     check_choice,
     check_table,
+    check_text,
     keep_numbers,
     placed,
     read_fields,
+    unexpected,
 )
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import rudder, usual_rudder
@@ -79,11 +81,20 @@ def measured_in_file(model: ShipModel) -> list[tuple[str, MeasuredIndex]]:
     """
     provenance = model.provenance or {}
     table = provenance.get("measured", {})
-    trials = [trial.get("name") for trial in provenance.get("trials", ())]
+    place = f"{model.name}: provenance.trials"
+    fitted = provenance.get("trials", [])
+    if not isinstance(fitted, list):
+        raise unexpected(place, "a list of tables", fitted)
+    tables = [check_table(trial, place) for trial in fitted]
+    trials = [check_text(trial.get("name"), f"{place} name") for trial in tables]
     where = f"{model.name}: provenance.measured"
     found = list[tuple[str, MeasuredIndex]]()
     for trial, indices in check_table(table, where, trials).items():
-        for name, given in check_table(indices, f"{where} {trial}", RULES).items():
+        named = check_table(indices, f"{where} {trial}", RULES)
+        if len({RULES[name].manoeuvre for name in named}) > 1:
+            wanted = "indices of one manoeuvre, as a trial is"
+            raise unexpected(f"{where} {trial}", wanted, list(named))
+        for name, given in named.items():
             place = f"{where} {trial} {name}"
             with placed(place, " "):
                 found.append((name, read_fields(MeasuredIndex, given, place)))

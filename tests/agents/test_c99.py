@@ -329,6 +329,16 @@ def test_what_is_no_closed_law_is_refused(agent, message):
         autopilot_source(agent)
 
 
+@pytest.mark.parametrize("kind", [PID, LQ])
+def test_gains_by_speed_say_what_to_give_where_no_speed_is_measured(kind):
+    """The service speed, for which the gains are; without a schedule nothing."""
+    surge = autopilot_source(kind.from_model(MARINER)).inputs["surge"]
+    assert surge.start == MARINER.particulars["speed"]
+    assert surge.meaning.endswith(f"where it is not measured {surge.start:.4g}")
+    same = autopilot_source(kind.from_model(MARINER, schedule=0.0))
+    assert "surge" not in same.inputs
+
+
 @pytest.mark.parametrize("name", ["9lives", "double", "é", "x" * 32])
 def test_a_name_that_c_does_not_take_is_refused(name):
     with pytest.raises(InputError, match=r"name: expected at most 31 letters.*--name"):

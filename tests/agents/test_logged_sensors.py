@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from agents import LQ, LQG, PID
+from agents.controllers.designs import design
+from agents.suites.suite import BenchmarkTask
 from identification.samples.logged_sensors import noise_and_waves
 from shipgym import Trial, manoeuvres
 from shipgym.errors import InputError
@@ -60,8 +62,11 @@ def test_a_design_expects_the_noise_of_its_model_s_trials(kind):
     assert kind.from_model(MARINER).design["noise"] == 1.0
     assert [expected(m) for m in (0.1, 3.0, 30.0)] == pytest.approx([1.0, 3.0, 10.0])
     assert expected(3.0, noise=2.0) == 2.0
-    with pytest.raises(InputError, match=r"^provenance\.noise\.r: .*expected a number"):
+    place = r"^model 'mariner': provenance\.noise"
+    with pytest.raises(InputError, match=rf"{place}\.r: .*expected a number"):
         kind.from_model(with_provenance(noise={"r": "loud"}))
+    with pytest.raises(InputError, match=f"{place}: expected a table"):
+        kind.from_model(with_provenance(noise="loud"))
 
 
 @pytest.mark.parametrize("kind", [PID, LQ])
@@ -74,3 +79,19 @@ def test_a_period_in_the_trials_is_filtered_unless_another_is_given(kind):
     too_short = with_provenance(wave_period=1.0)  # for the control interval
     assert kind.from_model(too_short).gains["wave_period"] == 0.0
     assert np.isfinite(kind.from_model(model).margins.delay_margin_s)
+
+
+@pytest.mark.parametrize("kind", [PID, LQ, LQG])
+@pytest.mark.parametrize("period", [1e9, 61.0, -1.0, "8"])
+def test_a_period_of_no_sea_in_a_model_is_refused(kind, period):
+    with pytest.raises(
+        InputError, match=r"'mariner': provenance\.wave_period: .*<= 60"
+    ):
+        kind.from_model(with_provenance(wave_period=period))
+
+
+@pytest.mark.parametrize(("period", "filtered"), [(3.0, 0.0), (8.0, 8.0)])
+def test_a_sea_that_the_interval_cannot_follow_is_not_filtered(period, filtered):
+    sea = {"name": "sea", "waves": {"significant_height": 0.5, "peak_period": period}}
+    task = BenchmarkTask("sea", "course-keeping", "kvlcc2", options={"sea": sea})
+    assert design("lq", task).gains["wave_period"] == filtered

@@ -103,7 +103,7 @@ def fit(trials: list[Trial], **settings: Any) -> IdentificationResult:
 @pytest.fixture(scope="module")
 def corrected(trials: list[Trial], reference: ShipModel) -> IdentificationResult:
     kernel = KernelResidual(centres=32, length=2.0, C=1e6)
-    return fit(trials, method="rm-svm", reference_model=reference, kernel=kernel)
+    return fit(trials, reference_model=reference, kernel=kernel)
 
 
 @pytest.fixture(scope="module")
@@ -253,19 +253,19 @@ def test_what_cannot_be(
     for given, settings, message in (
         (
             trials,
-            {"method": "rls", "reference_model": reference},
-            r"method: .*with a kernel on a grey box, .* got 'rls'",
+            {"method": "rm-svm", "reference_model": reference},
+            r"method: .*with a kernel on a grey box, .* got 'rm-svm'",
         ),
         (trials, {"structure": "auto"}, r"kernel: .*named, got 'auto'"),
         (trials, {"structure": "nomoto"}, r"kernel: .*u, v and r, got 'nomoto'"),
         (
             short,
-            {"method": "rm-svm", "reference_model": reference},
+            {"reference_model": reference},
             "different samples for 32 centres",
         ),
         (
             trials,
-            {"method": "rm-svm", "reference_model": truth},
+            {"reference_model": truth},
             "a grey box itself",
         ),
     ):

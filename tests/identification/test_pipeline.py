@@ -166,6 +166,7 @@ def test_result_is_saved_whole_and_read_back(
         ({"prior": "tanker"}, r"prior: expected none but with structure 'mmg'"),
         ({"prior": 3}, r"prior: .*3"),
         ({"structure": "mmg", "method": "tls-svm"}, "method: expected none with"),
+        ({"method": "map"}, r"method: .*or 'map' with structure 'mmg', got 'map'"),
         ({"kernel": "poly"}, r"kernel: .*'poly'"),
         ({"current": "tide"}, r"current: .*'tide'"),
         ({"current": {"north": 0.1}}, r"current: .*'east'"),

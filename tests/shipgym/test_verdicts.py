@@ -174,12 +174,18 @@ def test_what_trials_measured_travels_in_the_model_file():
     }
     ship = replace(load_model("kvlcc2"), provenance=provenance)
     assert measured_in_file(ship) == [("advance", MeasuredIndex(**index))]
-    for wrong, message in (
-        ({"other": {"advance": index}}, "measured: .*'other'"),
-        ({"turn": {"advance": index | {"side": "aft"}}}, "advance side: "),
+    both = {"advance": index, "overshoot_1_10_10": index}
+    for name, wrong, message in (
+        ("measured", {"other": {"advance": index}}, "measured: .*'other'"),
+        ("measured", {"turn": {"advance": index | {"side": "aft"}}}, "advance side: "),
+        ("measured", {"turn": both}, "turn: expected indices of one manoeuvre"),
+        ("measured", {"turn": {"advanse": index}}, "turn: .*Did you mean 'advance'"),
+        ("trials", "turn", "trials: expected a list of tables, got 'turn'"),
+        ("trials", ["turn"], "trials: expected a table"),
+        ("trials", [{}], "trials name: expected a non-empty string"),
     ):
-        known = replace(ship, provenance=provenance | {"measured": wrong})
-        with pytest.raises(InputError, match=message):
+        known = replace(ship, provenance=provenance | {name: wrong})
+        with pytest.raises(InputError, match=rf"kvlcc2: provenance\..*{message}"):
             measured_in_file(known)
 
 
