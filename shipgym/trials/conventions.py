@@ -81,10 +81,9 @@ AS_LOGGED = Installation()
 class Conventions:
     """Signs, frame and origin of a file, and the treatment of missing values.
 
-    The fields are the arguments of `Trial.from_csv`. With `repair`, holes of more than
-    10 rows and 20 time steps are refused all the same; `where` begins the messages,
-    such as ``"ship.toml: [conventions]"``. Raises InputError for another word, and for
-    the origin "cg" without `xg`.
+    The fields are the arguments of `Trial.from_csv`; `where` begins the messages, such
+    as ``"ship.toml: [conventions]"``. Raises InputError for another word, and for the
+    origin "cg" without `xg`.
     """
 
     rudder_positive: str = "starboard"

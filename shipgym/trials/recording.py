@@ -1,6 +1,5 @@
 """Conversion of a table's columns to channels in SI units, each on its clock."""
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -14,7 +13,7 @@ from shipgym.trials.column_values import (
     without_sentinels,
 )
 from shipgym.trials.columns import Column, Locator, choose_columns
-from shipgym.trials.missing_values import check_time, fill_missing
+from shipgym.trials.missing_values import check_present, check_time
 from shipgym.trials.navigation import local_metres
 from shipgym.trials.plausibility.values import (
     check_heading,
@@ -43,15 +42,19 @@ class Recording:
         By channel, headings without jumps.
     locator : Locator
         Places of the values in the file.
-    filled : dict of str to int
-        How many values of a channel were filled in.
+    rows : ndarray of shape (n_rows,) or None
+        Time, s, of the rows, where some of them lack a value; None for channels with
+        clocks of their own.
+    left_out : dict of str to int
+        How many outliers of a channel were left out.
     notes : list of str
         What was left out, and what was assumed of the values.
     """
 
     signals: Signals
     locator: Locator
-    filled: Mapping[str, int]
+    rows: Floats | None
+    left_out: Mapping[str, int]
     notes: list[str]
 
     @property
@@ -90,19 +93,26 @@ def read_recording(
     locator = Locator(table, chosen, rows=every)
     notes += times.notes
     channels = _read_numbers(locator, notes)
-    outliers = 0
+    left_out: dict[str, int] = {}
     if "lat" in chosen:
         north, east, outliers = _local_track(locator, times.t, repair, notes)
         channels |= {"x": north, "y": east}
+        left_out |= {"x": outliers, "y": outliers}
         chosen["x"] = replace(chosen["lat"], unit="m")
         chosen["y"] = replace(chosen["lon"], unit="m")
 
-    signals, locator, filled = _signals(times.t, channels, locator, repair)
-    if outliers:
-        filled |= {"x": outliers, "y": outliers}
+    own_clocks = table.own_clocks or have_own_clocks(times.t, channels)
+    if not own_clocks:
+        check_time(times.t, locator)
+        check_present(times.t, channels, locator, repair)
+    if "psi" in channels:
+        channels["psi"], left_out["psi"] = without_spikes(channels["psi"])
+    is_whole = np.isfinite([*channels.values()]).all()
+    signals = _signals(times.t, channels, locator)
     if "sog" in signals:
         _make_velocity(signals)
-    return Recording(signals, locator, filled, notes)
+    rows = None if own_clocks or is_whole else times.t
+    return Recording(signals, locator, rows, left_out, notes)
 
 
 def _settle_speed(chosen: dict[str, Column]) -> list[str]:
@@ -147,38 +157,19 @@ def _read_numbers(locator: Locator, notes: list[str]) -> dict[str, Floats]:
     return channels
 
 
-def _signals(
-    t: Floats, channels: dict[str, Floats], locator: Locator, repair: str | None
-) -> tuple[Signals, Locator, dict[str, int]]:
-    """Signals of channels, their locator, and counts of values filled in.
-
-    The channels are on the clock of the rows, or each on a clock of its own, where it
-    has values.
-    """
-    filled: dict[str, int] = {}
-    if "psi" in channels:
-        channels["psi"], filled["psi"] = without_spikes(channels["psi"])
-    is_whole = bool(np.isfinite([t, *channels.values()]).all())
-    own_clocks = locator.table.own_clocks or have_own_clocks(t, channels)
-    is_shared = is_whole or not own_clocks
-    if is_shared:
-        check_time(t, locator)
-    if is_shared and not is_whole:
-        t, channels, locator, missing = fill_missing(t, channels, locator, repair)
-        filled = dict(Counter(filled) + Counter(missing))
+def _signals(t: Floats, channels: dict[str, Floats], locator: Locator) -> Signals:
+    """Signals of channels, each where it has values; angles without jumps."""
     check_ranges({"t": t, **channels}, locator)
     signals = {}
     for name, values in channels.items():
-        signal, here = Signal(t, values), locator
-        if not is_shared:
-            signal, here = _own_signal(name, t, values, locator)
-        if name in ("psi", "wind_from"):  # without jumps
+        signal, here = _own_signal(name, t, values, locator)
+        if name in ("psi", "wind_from"):
             unwrapped = np.unwrap(signal.values)
             if name == "psi":
                 check_heading(signal.t, unwrapped, signal.values, here)
             signal = signal._replace(values=unwrapped)
         signals[name] = signal
-    return signals, locator, filled
+    return signals
 
 
 def _own_signal(
@@ -189,6 +180,9 @@ def _own_signal(
     InputError for too few or time that goes back.
     """
     rows = np.flatnonzero(np.isfinite(values))
+    if rows.size == t.size:
+        check_time(t, locator)
+        return Signal(t, values), locator
     if rows.size < FEWEST_SAMPLES:
         raise InputError(
             f"{locator.path}: column '{locator.columns[channel].name}': expected"

@@ -108,24 +108,28 @@ def have_own_clocks(t: Floats, channels: Mapping[str, Floats]) -> bool:
     return any(one.size >= FEWEST_SAMPLES and usual_step(one) >= 2.0 for one in rows)
 
 
-def on_one_clock(signals: Mapping[str, Signal], where: str) -> Log:
+def on_one_clock(
+    signals: Mapping[str, Signal], where: str, rows: Floats | None = None
+) -> Log:
     """Put channels onto one clock.
 
     Where they do not share one already, it is that of the slowest channel of the
-    motion, where all of these have values; the others are interpolated linearly. A hole
-    in one of the motion's channels stays a hole. Raises InputError where too few
-    moments are left.
+    motion, or that of the rows, s, in which some lack a value; the others are
+    interpolated linearly. A hole in one of the motion's channels stays a hole. Raises
+    InputError where too few moments are left.
     """
     first, *others = signals.values()
-    if all(one.t is first.t for one in others):
+    if rows is None and all(one.t is first.t for one in others):
         channels = {name: signal.values for name, signal in signals.items()}
         return Log(first.t, channels, where, notes=[])
 
     # between samples of the motion nothing is invented
     motion = {"x", "ground_north", "u", "psi", "r", "delta"} & signals.keys()
     clocks = {name: signals[name].t for name in signals if name in motion or not motion}
-    # to a millisecond; of equal ones the clock with fewer holes
-    t = max(clocks.values(), key=lambda t: (round(usual_step(t), 3), t.size))
+    t = rows
+    if t is None:
+        # to a millisecond; of equal ones the clock with fewer holes
+        t = max(clocks.values(), key=lambda t: (round(usual_step(t), 3), t.size))
     # a longer one is a hole
     longest_step = 6.0 * usual_step(t)
     is_known = np.ones(t.size, dtype=bool)
@@ -149,7 +153,12 @@ def on_one_clock(signals: Mapping[str, Signal], where: str) -> Log:
     channels = {
         name: np.interp(t, signal.t, signal.values) for name, signal in signals.items()
     }
-    return Log(t, channels, where, notes)
+    log = Log(t, channels, where, notes)
+    if rows is not None:
+        for name, signal in signals.items():
+            is_filled = np.isin(t, signal.t, invert=True)
+            log.repaired[name] = int(is_filled.sum())
+    return log
 
 
 def _inside(t: Floats, clock: Floats, is_hole: Flags) -> Flags:

@@ -304,8 +304,9 @@ class Trial:
         xg : float, optional
             Centre of gravity forward of midship, m.
         repair : {"interpolate"}, optional
-            Fill missing values (nan, empty cells) from their neighbours; rows at either
-            end that lack a value are left out. Without it a missing value is an error.
+            Fill missing values (nan, empty cells) from their neighbours, but for holes
+            of more than six steps; rows at either end that lack a value are left out.
+            Without it a missing value is an error.
         name, kind, use, length : optional
             As in :class:`Trial`; the name is the file's by default.
         sensors : mapping, optional

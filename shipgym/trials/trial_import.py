@@ -62,7 +62,7 @@ def import_table(
     if conventions.frame == "enu":
         _turn_frame(signals, conventions.velocity_frame, has_positions=has_positions)
 
-    log = on_one_clock(signals, recording.locator.path)
+    log = on_one_clock(signals, recording.locator.path, recording.rows)
     remarks = _check_channels(log, recording.locator, conventions)
     has_offset = conventions.installation.heading_offset != 0.0
     log.magnetic = recording.is_magnetic and not has_offset
@@ -129,7 +129,5 @@ def _complete(log: Log, recording: Recording) -> None:
     """Order the channels, and add the counts of values filled in."""
     known = [name for name in QUANTITIES if name in log.channels]
     log.channels = {name: log.channels[name] for name in known}
-    for name in known:
-        count = recording.filled.get(name, 0)
-        if count:
-            log.repaired[name] = count
+    counts = {**recording.left_out, **log.repaired}
+    log.repaired = {name: counts[name] for name in known if counts.get(name)}

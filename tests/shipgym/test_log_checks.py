@@ -252,6 +252,14 @@ def test_a_heading_is_filled_across_north(unit, turn, tmp_path):
     np.testing.assert_allclose(trial["psi"], expected)
 
 
+def test_a_long_hole_stays_a_hole(tmp_path):
+    psi = np.where((T > 49.0) & (T < 80.0), NAN, SWING)
+    path = written(tmp_path / "run.csv", t=T, psi=psi, u=U)
+    trial = Trial.from_csv(path, repair="interpolate")
+    assert (len(trial), np.diff(trial.t).max()) == (170, 31.0)
+    assert "psi has 1 holes, of up to 31 s; nothing is put there" in trial.notes
+
+
 def test_time_that_stands_still_or_goes_back_is_refused(tmp_path):
     for t, message in (
         ([0.0, 1.0, 1.0, 2.0], "line 4 (data row 3), column 't': expected time to"),

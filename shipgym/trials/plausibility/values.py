@@ -52,10 +52,10 @@ def check_ranges(channels: Mapping[str, Floats], locator: Locator) -> None:
 
 
 def without_spikes(psi: Floats) -> tuple[Floats, int]:
-    """Heading whose single outliers are filled in, and their number.
+    """Heading without its single outliers, which become nan, and their number.
 
     An outlier is more than 30 degrees from both neighbours, which agree to 30 degrees.
-    Where more than one in a hundred are, the sensor is at fault, and none is filled.
+    Where more than one in a hundred are, the sensor is at fault, and none is taken out.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def without_spikes(psi: Floats) -> tuple[Floats, int]:
     if not 0 < outliers.size <= 0.01 * psi.size:
         return psi, 0
     filled = psi.copy()
-    filled[1 + outliers] = psi[outliers] + 0.5 * across[outliers]
+    filled[1 + outliers] = np.nan
     return filled, outliers.size
 
 
