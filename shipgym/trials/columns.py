@@ -79,6 +79,12 @@ class Locator:
         """The file."""
         return str(self.table.path)
 
+    @property
+    def is_magnetic(self) -> bool:
+        """True if the heading counts from magnetic north, as its name says too."""
+        name = self.columns["psi"].name if "psi" in self.columns else ""
+        return self.table.magnetic or "mag" in name.lower()
+
     def place(self, sample: SupportsIndex, channel: str) -> str:
         """Place of a value: ``run.csv: line 12 (data row 11), column 'yaw'``."""
         row = int(self.rows[sample])

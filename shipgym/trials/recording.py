@@ -1,7 +1,7 @@
-"""Conversion of a table's columns to channels in SI units, each on its clock."""
+"""Conversion of a table's columns to channels in SI units, on one clock."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,52 +24,21 @@ from shipgym.trials.plausibility.values import (
 from shipgym.trials.readers.log_table import REPAIR, LogTable
 from shipgym.trials.resampling import (
     FEWEST_SAMPLES,
+    Log,
     Signal,
     Signals,
     have_own_clocks,
+    on_one_clock,
 )
 from shipgym.trials.row_times import read_times
 from shipgym.trials.units import si_factor
-
-
-@dataclass(frozen=True)
-class Recording:
-    """The channels of one file, in SI units.
-
-    Attributes
-    ----------
-    signals : dict of str to Signal
-        By channel, headings without jumps.
-    locator : Locator
-        Places of the values in the file.
-    rows : ndarray of shape (n_rows,) or None
-        Time, s, of the rows, where some of them lack a value; None for channels with
-        clocks of their own.
-    left_out : dict of str to int
-        How many outliers of a channel were left out.
-    notes : list of str
-        What was left out, and what was assumed of the values.
-    """
-
-    signals: Signals
-    locator: Locator
-    rows: Floats | None
-    left_out: Mapping[str, int]
-    notes: list[str]
-
-    @property
-    def is_magnetic(self) -> bool:
-        """True if the heading counts from magnetic north, as its name says too."""
-        columns = self.locator.columns
-        name = columns["psi"].name if "psi" in columns else ""
-        return self.locator.table.magnetic or "mag" in name.lower()
 
 
 def read_recording(
     table: LogTable,
     columns: Mapping[str, Column] | None,
     repair: str | None,
-) -> Recording:
+) -> Log:
     """Read the chosen columns of a table, checked and, if asked for, repaired.
 
     `columns` are as :func:`.columns.choose_columns` takes them. Anything wrong with a
@@ -112,7 +81,10 @@ def read_recording(
     if "sog" in signals:
         _make_velocity(signals)
     rows = None if own_clocks or is_whole else times.t
-    return Recording(signals, locator, rows, left_out, notes)
+    log = on_one_clock(signals, locator, rows)
+    log.notes = notes + log.notes
+    log.repaired = left_out | log.repaired
+    return log
 
 
 def _settle_speed(chosen: dict[str, Column]) -> list[str]:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from shipgym.arrays import Flags, Floats, integral
 from shipgym.errors import InputError
+from shipgym.trials.columns import Locator
 
 #: Fewest samples of a trial, and of a channel.
 FEWEST_SAMPLES = 3
@@ -35,8 +36,8 @@ class Log:
         Time, s.
     channels : dict of str to ndarray of shape (n_samples,)
         Values by channel.
-    where : str
-        What messages begin with: the file.
+    locator : Locator
+        Places of the values in the file.
     notes : list of str
         Remarks of readers, checks and corrections.
     derived : set of str
@@ -51,7 +52,7 @@ class Log:
 
     t: Floats
     channels: dict[str, Floats]
-    where: str
+    locator: Locator
     notes: list[str]
     derived: set[str] = field(default_factory=set)
     repaired: dict[str, int] = field(default_factory=dict)
@@ -62,8 +63,8 @@ class Log:
         """A channel with which another is converted; InputError where it is absent."""
         if channel not in self.channels or channel in self.derived:
             raise InputError(
-                f"{self.where}: expected {channel} to convert {what}, got none; name"
-                " its column"
+                f"{self.locator.path}: expected {channel} to convert {what}, got"
+                " none; name its column"
             )
         return self.channels[channel]
 
@@ -109,7 +110,7 @@ def have_own_clocks(t: Floats, channels: Mapping[str, Floats]) -> bool:
 
 
 def on_one_clock(
-    signals: Mapping[str, Signal], where: str, rows: Floats | None = None
+    signals: Mapping[str, Signal], locator: Locator, rows: Floats | None
 ) -> Log:
     """Put channels onto one clock.
 
@@ -121,7 +122,7 @@ def on_one_clock(
     first, *others = signals.values()
     if rows is None and all(one.t is first.t for one in others):
         channels = {name: signal.values for name, signal in signals.items()}
-        return Log(first.t, channels, where, notes=[])
+        return Log(first.t, channels, locator, notes=[])
 
     # between samples of the motion nothing is invented
     motion = {"x", "ground_north", "u", "psi", "r", "delta"} & signals.keys()
@@ -147,13 +148,13 @@ def on_one_clock(
     t = t[is_known]
     if t.size < FEWEST_SAMPLES:
         raise InputError(
-            f"{where}: expected channels of one time, got {t.size} moments that"
+            f"{locator.path}: expected channels of one time, got {t.size} moments that"
             f" {', '.join(clocks)} have in common; check their clocks"
         )
     channels = {
         name: np.interp(t, signal.t, signal.values) for name, signal in signals.items()
     }
-    log = Log(t, channels, where, notes)
+    log = Log(t, channels, locator, notes)
     if rows is not None:
         for name, signal in signals.items():
             is_filled = np.isin(t, signal.t, invert=True)

@@ -96,8 +96,8 @@ def check_rudder_side(log: Log) -> None:
     found = rudder_side(log.t, log.heading, log.channels["delta"])
     if found.side == "port" and found.is_sure:
         raise InputError(
-            f"{log.where}: expected a positive rudder to turn the bow to starboard, got"
-            f" the opposite sign ({found.reason}); write rudder_positive ="
+            f"{log.locator.path}: expected a positive rudder to turn the bow to"
+            f" starboard, got the opposite sign ({found.reason}); write rudder_positive ="
             ' "port" in [conventions], or take it out if it stands there',
             [("rudder_positive", "port")],
         )

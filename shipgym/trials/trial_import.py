@@ -3,7 +3,7 @@
 import math
 from collections.abc import Collection, Mapping
 
-from shipgym.trials.columns import Column, Locator
+from shipgym.trials.columns import Column
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.midship import to_project_conventions
 from shipgym.trials.plausibility.agreement import (
@@ -15,8 +15,8 @@ from shipgym.trials.plausibility.agreement import (
 )
 from shipgym.trials.plausibility.values import check_rudder_unit, frozen_heading
 from shipgym.trials.readers.log_table import LogTable
-from shipgym.trials.recording import Recording, read_recording
-from shipgym.trials.resampling import Log, Signals, on_one_clock
+from shipgym.trials.recording import read_recording
+from shipgym.trials.resampling import Log
 from shipgym.trials.rudder_sign import check_rudder_side
 from shipgym.trials.units import QUANTITIES
 
@@ -53,23 +53,25 @@ def import_table(
     the project's signs and are in the body frame, at midship. Anything wrong with a
     file is an InputError that names line, column, value and remedy.
     """
-    recording = read_recording(table, columns, conventions.repair)
-    signals = dict(recording.signals)
-    has_positions = "lat" in recording.locator.columns
+    log = read_recording(table, columns, conventions.repair)
     if conventions.rudder_positive == "port":
-        for name in signals.keys() & {"delta", "delta_command"}:
-            _turn(signals, name)
+        for name in log.channels.keys() & {"delta", "delta_command"}:
+            log.channels[name] = -log.channels[name]
     if conventions.frame == "enu":
-        _turn_frame(signals, conventions.velocity_frame, has_positions=has_positions)
+        _turn_frame(log, conventions.velocity_frame)
 
-    log = on_one_clock(signals, recording.locator.path, recording.rows)
-    remarks = _check_channels(log, recording.locator, conventions)
+    remarks = _check_channels(log, conventions)
     has_offset = conventions.installation.heading_offset != 0.0
-    log.magnetic = recording.is_magnetic and not has_offset
-    magnetic = [_MAGNETIC] if log.magnetic else []
-    log.notes = [*recording.notes, *magnetic, *log.notes, *remarks]
+    log.magnetic = log.locator.is_magnetic and not has_offset
+    if log.magnetic:
+        log.notes.append(_MAGNETIC)
+    log.notes += remarks
     to_project_conventions(log, conventions)
-    _complete(log, recording)
+    known = [name for name in QUANTITIES if name in log.channels]
+    log.channels = {name: log.channels[name] for name in known}
+    log.repaired = {
+        name: log.repaired[name] for name in known if log.repaired.get(name)
+    }
     return log
 
 
@@ -82,30 +84,29 @@ def lacking(known: Collection[str]) -> list[str]:
     ]
 
 
-def _turn(signals: Signals, name: str, zero: float = 0.0) -> None:
-    """Let a channel count to the other side, from another zero."""
-    signals[name] = signals[name]._replace(values=zero - signals[name].values)
-
-
-def _turn_frame(signals: Signals, velocity_frame: str, *, has_positions: bool) -> None:
+def _turn_frame(log: Log, velocity_frame: str) -> None:
     """Make angles that count from east to port those from north to starboard.
 
     As ROS has them: x east and y north, body forward and to port. Latitudes and
     longitudes became x and y as they should be.
     """
+    channels = log.channels
     in_body = velocity_frame == "body"
-    for name in signals.keys() & {"psi", "r", "Y", "N", *(["v"] if in_body else [])}:
-        _turn(signals, name, 0.5 * math.pi if name == "psi" else 0.0)
+    turned = {"psi", "r", "Y", "N", *(["v"] if in_body else [])}
+    for name in channels.keys() & turned:
+        zero = 0.5 * math.pi if name == "psi" else 0.0
+        channels[name] = zero - channels[name]
     pairs = [] if in_body else [("u", "v")]
-    if not has_positions:
+    if "lat" not in log.locator.columns:
         pairs.append(("x", "y"))
     for east, north in pairs:
-        if {east, north} <= signals.keys():
-            signals[east], signals[north] = signals[north], signals[east]
+        if log.has(east, north):
+            channels[east], channels[north] = channels[north], channels[east]
 
 
-def _check_channels(log: Log, locator: Locator, conventions: Conventions) -> list[str]:
+def _check_channels(log: Log, conventions: Conventions) -> list[str]:
     """Refuse impossible and contradictory channels; remarks on what is odd."""
+    locator = log.locator
     remarks = lacking(log.channels)
     remarks += frozen_heading(log)
     remarks += check_steps(log.t, locator)
@@ -123,11 +124,3 @@ def _check_channels(log: Log, locator: Locator, conventions: Conventions) -> lis
         check_velocity(log, conventions.velocity_frame, locator)
     check_rudder_side(log)
     return remarks
-
-
-def _complete(log: Log, recording: Recording) -> None:
-    """Order the channels, and add the counts of values filled in."""
-    known = [name for name in QUANTITIES if name in log.channels]
-    log.channels = {name: log.channels[name] for name in known}
-    counts = {**recording.left_out, **log.repaired}
-    log.repaired = {name: counts[name] for name in known if counts.get(name)}
