@@ -75,7 +75,8 @@ class _Trace:
             self._visit_all(value._field_defaults.items())
             self.records.append(value)
         elif _is_known(value):
-            self.add(value)
+            module = getattr(value, "__module__", None)
+            self.add((module, getattr(value, "__name__", value)))
         else:  # nothing is known of its content: no other process finds it
             _UNKNOWN[id(value)] = value  # so that no other value has its number
             self.add((process_name(os.getpid()), id(value)))
@@ -134,7 +135,7 @@ class _Trace:
 
 
 def _is_known(value: Any) -> bool:
-    """Return whether the text of a value says all that it is."""
+    """Return whether a value's name, or its text if it has none, says what it is."""
     module = getattr(value, "__module__", None) or type(value).__module__
     return module.partition(".")[0] in ("builtins", "math", "numpy", "_operator")
 

@@ -97,8 +97,8 @@ def check_rudder_side(log: Log) -> None:
     if found.side == "port" and found.is_sure:
         raise InputError(
             f"{log.locator.path}: expected a positive rudder to turn the bow to"
-            f" starboard, got the opposite sign ({found.reason}); write rudder_positive ="
-            ' "port" in [conventions], or take it out if it stands there',
+            f" starboard, got the opposite sign ({found.reason}); write rudder_positive"
+            ' = "port" in [conventions], or take it out if it stands there',
             [("rudder_positive", "port")],
         )
 

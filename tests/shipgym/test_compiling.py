@@ -182,3 +182,31 @@ def test_loops_from_files_call_their_own_functions_whose_names_and_types_are_ali
     assert answers("far-near") == ["2.0"]
     assert answers("near-far", "far-near") == ["1.0", "2.0"]
     assert answers("far-near", "near-far") == ["2.0", "1.0"]
+
+
+FILES = """
+import gymnasium
+import shipgym
+from shipgym.engine import compiling
+
+def tell(loop, path):
+    print(path.name)
+    raise LookupError
+
+compiling.load = tell  # reads a file; the test compiles nothing
+for name in gymnasium.registry:
+    if name.startswith("shipgym/"):
+        try:
+            gymnasium.make(name)
+        except LookupError:
+            pass
+"""
+
+
+def test_a_later_process_finds_the_compiled_environments(tmp_path):
+    first, second = (
+        run(FILES, SHIPGYM_CACHE=str(tmp_path), PYTHONHASHSEED=seed).split()
+        for seed in "12"
+    )
+    assert len(first) > 5
+    assert first == second
