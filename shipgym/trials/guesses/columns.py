@@ -14,7 +14,6 @@ from shipgym.files import shipped_toml
 from shipgym.trials.clock_texts import unit_since_1970
 from shipgym.trials.column_values import without_sentinels
 from shipgym.trials.columns import ColumnGuess
-from shipgym.trials.guesses.steering import steering_command
 from shipgym.trials.readers.cell_texts import units_in_cell
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.units import (
@@ -188,10 +187,6 @@ def guess_columns(table: LogTable) -> list[ColumnGuess]:
             free.remove(found.name)
 
     for channel in known:
-        if channel == "n" and guesses.keys().isdisjoint(RUDDERS):
-            command = steering_command(table, free)
-            if command is not None:
-                guesses["delta"] = command
         is_speed_alone = channel == "v" and "u" not in guesses
         is_channel = channel in QUANTITIES and not is_speed_alone
         if is_channel:
