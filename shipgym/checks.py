@@ -76,10 +76,10 @@ def check_keys(
     """Refuse an unknown key, naming the nearest, and a missing required one."""
     for key in mapping:
         if key not in allowed:
-            raise InputError(
-                f"{where}: unknown key '{key}'.{did_you_mean(key, allowed)} Known keys:"
-                f" {quoted(allowed)}"
-            )
+            near = did_you_mean(key, allowed)
+            is_told = near and len(allowed) > 20
+            known = "" if is_told else f" Known keys: {quoted(allowed)}"
+            raise InputError(f"{where}: unknown key '{key}'.{near}{known}")
     for key in required:
         if key not in mapping:
             raise InputError(
@@ -269,11 +269,11 @@ def check_finite(values: Any, where: str, hint: str = "") -> NDArray[np.float64]
     wrong = np.argwhere(~np.isfinite(array))
     if len(wrong):
         place = tuple(wrong[0].tolist())
-        sample = place[0] if len(place) == 1 else place
+        sample = ", ".join(map(str, place))
+        where_in_it = f" at sample {sample}" if place else ""
         remedy = f"; {hint}" if hint else ""
         raise InputError(
-            f"{where}: expected finite numbers, got {array[place]} at sample"
-            f" {sample}{remedy}"
+            f"{where}: expected finite numbers, got {array[place]}{where_in_it}{remedy}"
         )
     array.setflags(write=False)
     return array

@@ -301,7 +301,8 @@ def look_command(
         for channel, words in reading.items():
             say(f"  {channel}: {words}")
         for note in trial.notes:
-            warn(f"{trial.name}: {note}")
+            is_named = note.startswith(trial.name)
+            warn(note if is_named else f"{trial.name}: {note}")
     for remark in remarks:
         warn(remark)
     found = {"written": str(out), "verdict": headline, "trials": fields}

@@ -58,7 +58,12 @@ def start_lanes(engine: Engine, asked: Any, chosen: Flags) -> None:
     if "leg.sine" not in present and "cross_track" in known:
         known.remove("cross_track")
     check_keys(check_table(asked, where), known, where)
-    limits = {"heading_error": np.pi, "rudder": engine.model.steering.limit}
+    limit = engine.model.steering.limit
+    ranges = {
+        "speed": (0.0, np.inf),
+        "heading_error": (-np.pi, np.pi),
+        "rudder": (-limit, limit),
+    }
     columns = {}
     for name, values in asked.items():
         numbers = check_finite(values, f"{where}: {name}")
@@ -66,9 +71,9 @@ def start_lanes(engine: Engine, asked: Any, chosen: Flags) -> None:
         if numbers.shape not in shapes:
             expected = f"a number, or one for each of {engine.num_envs} rows"
             raise unexpected(f"{where}: {name}", expected, values)
-        limit = limits.get(name, np.inf)
-        if np.abs(numbers).max() > limit:
-            expected = f"at most {limit:g} rad to each side"
+        least, most = ranges.get(name, (-np.inf, np.inf))
+        if numbers.min() < least or numbers.max() > most:
+            expected = f"{least:g} to {most:g} in SI units"
             raise unexpected(f"{where}: {name}", expected, values)
         columns[name] = np.broadcast_to(numbers, (engine.num_envs,))
 

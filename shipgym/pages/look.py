@@ -56,11 +56,11 @@ def verdict(trials: Sequence[Trial], to_decide: Sequence[str]) -> tuple[str, str
         return "Nothing can be identified from this: there is no rudder.", "bad"
     if not channels & {"psi", "r"}:
         return "Nothing can be identified from this: there is no heading.", "bad"
-    remarks = sum(len(trial.notes) for trial in trials)
-    found = counted(remarks, "remark") if remarks else "no remark"
+    notes = sum(len(trial.notes) for trial in trials)
+    found = counted(notes, "warning") if notes else "no warning"
     return (
         f"{counted(len(trials), 'trial')} to identify a model from, with {found}.",
-        "warn" if remarks else "good",
+        "warn" if notes else "good",
     )
 
 

@@ -65,7 +65,7 @@ def test_columns_that_all_logs_have_alike_are_declared_once(log, monkeypatch, ca
 def test_the_record_is_drawn_on_a_page(log, monkeypatch, capsys):
     code, said = command(monkeypatch, capsys, "look", "log.csv")
     assert (code, "log.csv: 300 samples over 299 s: psi, r, delta" in said) == (0, True)
-    assert "1 trial to identify a model from, with 1 remark." in said
+    assert "1 trial to identify a model from, with 1 warning." in said
     page = (log / "look-log.html").read_text()
     assert page.count("Plotly.newPlot(") == 1
     assert "The channels over time." in page

@@ -186,7 +186,8 @@ def test_an_episode_starts_as_asked():
     for asked, message in (
         ({"cross_track": 1e5}, "start: expected a ship .* lost or arrived in lane 0"),
         ({"speed": 1e3}, "start: expected a ship .* beyond the physical range"),
-        ({"rudder": 3.0}, "start: rudder: expected at most 0.69"),
+        ({"rudder": 3.0}, "start: rudder: expected -0.69.* to 0.69"),
+        ({"speed": -1.0}, "start: speed: expected 0 to inf"),
         ({"sped": 3.0}, "Did you mean 'speed'"),
         (
             {"speed": [1.0, 2.0]},

@@ -117,7 +117,7 @@ class TrialGuess:
         columns = []
         for one in self.columns:
             if one.channel in together:
-                because = f"by the check that refused {one.unit} ({one.reason})"
+                because = f"fits where {one.unit} does not ({one.reason})"
                 one = replace(one, unit=value, reason=because)
             columns.append(one)
         self.columns = columns
