@@ -58,24 +58,9 @@ def start_lanes(engine: Engine, asked: Any, chosen: Flags) -> None:
     if "leg.sine" not in present and "cross_track" in known:
         known.remove("cross_track")
     check_keys(check_table(asked, where), known, where)
-    limit = engine.model.steering.limit
-    ranges = {
-        "speed": (0.0, np.inf),
-        "heading_error": (-np.pi, np.pi),
-        "rudder": (-limit, limit),
+    columns = {
+        name: check_numbers(engine, name, values) for name, values in asked.items()
     }
-    columns = {}
-    for name, values in asked.items():
-        numbers = check_finite(values, f"{where}: {name}")
-        shapes = (), (engine.num_envs,)
-        if numbers.shape not in shapes:
-            expected = f"a number, or one for each of {engine.num_envs} rows"
-            raise unexpected(f"{where}: {name}", expected, values)
-        least, most = ranges.get(name, (-np.inf, np.inf))
-        if numbers.min() < least or numbers.max() > most:
-            expected = f"{least:g} to {most:g} in SI units"
-            raise unexpected(f"{where}: {name}", expected, values)
-        columns[name] = np.broadcast_to(numbers, (engine.num_envs,))
 
     errors = columns.pop("heading_error", np.full(engine.num_envs, np.nan))
     place_ships(engine, columns, chosen)
@@ -88,6 +73,26 @@ def start_lanes(engine: Engine, asked: Any, chosen: Flags) -> None:
                 "options: start: expected a ship that is under control and on her way,"
                 f" got one beyond the physical range, lost or arrived in lane {lane}"
             )
+
+
+def check_numbers(engine: Engine, name: str, values: Any) -> Floats:
+    """Return a number of a start for each lane, shape (num_envs,)."""
+    where = f"options: start: {name}"
+    numbers = check_finite(values, where)
+    if numbers.shape not in ((), (engine.num_envs,)):
+        expected = f"a number, or one for each of {engine.num_envs} rows"
+        raise unexpected(where, expected, values)
+    limit = engine.model.steering.limit
+    ranges = {
+        "speed": (0.0, np.inf),
+        "heading_error": (-np.pi, np.pi),
+        "rudder": (-limit, limit),
+    }
+    least, most = ranges.get(name, (-np.inf, np.inf))
+    if numbers.min() < least or numbers.max() > most:
+        expected = f"{least:g} to {most:g} in SI units"
+        raise unexpected(where, expected, values)
+    return np.broadcast_to(numbers, (engine.num_envs,))
 
 
 def place_ships(engine: Engine, columns: dict[str, Floats], chosen: Flags) -> None:
