@@ -7,22 +7,15 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
-from shipgym.trials.clock_texts import DAY, read_clock, spread_evenly
+from shipgym.trials.clock_texts import read_clock, spread_evenly
 from shipgym.trials.columns import Column
 from shipgym.trials.readers.cell_texts import is_number
 from shipgym.trials.readers.log_table import REPAIR, LogTable
 from shipgym.trials.resampling import usual_step
 from shipgym.trials.units import si_factor
 
-#: Zero of the units that count from a date, s since 1970.
-_EPOCHS = {
-    "unix": 0.0,
-    "unix ms": 0.0,
-    "unix us": 0.0,
-    "unix ns": 0.0,
-    "excel days": -25_569.0 * DAY,
-    "matlab days": -719_529.0 * DAY,
-}
+#: Beginnings of the units that count from a date.
+_FROM_A_DATE = ("unix", "excel", "matlab")
 _COMPACT = re.compile(
     r"((?:19|20)\d\d[01]\d[0-3]\d)?([0-2]\d)([0-5]\d)([0-5]\d(?:\.\d+)?)"
 )
@@ -56,10 +49,9 @@ def read_times(table: LogTable, column: Column) -> RowTimes:
         clock = si_factor("t", column.unit) * table.numbers(column.name)
         if column.unit.endswith("days"):
             clock = np.round(clock, 3)  # days have some nine decimals
-        clock += _EPOCHS.get(column.unit, 0.0)
         clock[np.isinf(clock)] = np.nan
     clock = _one_after_another(_spread(clock, notes), notes)
-    if is_numeric and column.unit not in _EPOCHS:
+    if is_numeric and not column.unit.startswith(_FROM_A_DATE):
         return RowTimes(clock, column.unit, notes)
     known = clock[np.isfinite(clock)]
     zero = float(known[0]) if known.size else 0.0

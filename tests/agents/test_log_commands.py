@@ -166,7 +166,7 @@ def test_a_log_without_known_names_gives_a_ship_file_to_complete(
         in written
     )
     code, said = command(monkeypatch, capsys, "identify", "ship.toml", "--out", "out")
-    assert (code, "ship.toml: line 19: t: expected a decision" in said) == (2, True), (
+    assert (code, "ship.toml: line 18: t: expected a decision" in said) == (2, True), (
         said
     )
     for channel, name in {"t": "a", "psi": "b", "delta": "c"}.items():
