@@ -28,8 +28,17 @@ _SENTINELS = {
 
 
 def column_numbers(table: LogTable, column: Column) -> Floats:
-    """Numbers of a column, of a steering command degrees of rudder."""
+    """Numbers of a column, of a steering command degrees of rudder.
+
+    Of a quaternion the heading, rad.
+    """
     numbers = table.numbers(column.name)
+    if column.quaternion is not None:
+        w = numbers
+        x, y, z = (table.numbers(name) for name in column.quaternion)
+        # the first of the angles of Tait and Bryan, about z
+        yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return np.asarray(yaw)
     if column.full is None:
         return numbers
     if column.minus is not None:

@@ -30,17 +30,19 @@ class Column:
     minus: str | None = None  # column that is subtracted: of the other propeller
     neutral: float = 0.0  # number of a steering command that steers straight
     full: float | None = None  # change of the command that counts as 35 deg of rudder
+    quaternion: tuple[str, ...] | None = None  # columns of x, y and z, beside that of w
 
     @property
     def extra(self) -> dict[str, Any]:
         """What is declared of the column beside its name and its unit."""
-        keys = ("date", "minus", "neutral", "full")
+        keys = ("date", "minus", "neutral", "full", "quaternion")
         return {key: getattr(self, key) for key in keys if getattr(self, key)}
 
     @property
     def names(self) -> set[str]:
         """Columns of the file that are read."""
-        return {self.name, *filter(None, (self.date, self.minus))}
+        others = (self.date, self.minus, *(self.quaternion or ()))
+        return {self.name, *filter(None, others)}
 
     @property
     def declaration(self) -> str:
@@ -106,6 +108,7 @@ class Locator:
 #: Keys of the column of a channel, beside those of each.
 _KEYS = {
     "t": ["date"],
+    "psi": ["quaternion"],
     "delta": ["minus", "neutral", "full"],
     "delta_command": ["minus", "neutral", "full"],
 }
@@ -117,8 +120,9 @@ def parse_columns(
     """Check a table of columns by channel.
 
     Each entry is the name of a column or ``{"column": name, "unit": unit}``. That of
-    the time may also have ``"date"``, the column of the date, that of the rudder
-    ``"full"``, ``"neutral"`` and ``"minus"``, which make a steering command.
+    the time may also have ``"date"``, the column of the date, that of the heading
+    ``"quaternion"``, the columns of x, y and z beside that of w, that of the
+    rudder ``"full"``, ``"neutral"`` and ``"minus"``, which make a steering command.
     `where` begins the messages. Raises InputError for an unknown channel, key or unit,
     a unit of another quantity, and a column that is given twice.
     """
@@ -152,8 +156,15 @@ def _parse_column(channel: str, entry: Any, where: str) -> Column:
     for key, value in fields.items():
         if key in ("neutral", "full"):
             fields[key] = check_number(value, f"{where} {key}")
-        else:
+        elif key != "quaternion":
             check_text(value, f"{where} {key}")
+        elif isinstance(value, list | tuple) and [*map(type, value)] == [str] * 3:
+            fields[key] = tuple(value)
+        else:
+            raise InputError(
+                f"{where} quaternion: expected the columns of x, y and z, beside that"
+                f' of w in column, such as ["q[1]", "q[2]", "q[3]"], got {value!r}'
+            )
     is_command = not fields.keys().isdisjoint(("neutral", "full", "minus"))
     if is_command:
         fields.setdefault("unit", "deg")

@@ -24,9 +24,7 @@ from shipgym.trials.units import QUANTITIES
 _LACKING = {
     ("delta", "delta_command", "X"): (
         "no rudder angle in this log: without rudder nothing can be identified from it,"
-        " it can only be looked at; log the rudder too (in NMEA 0183 the sentence RSA),"
-        ' or declare what steers her, such as delta = { column = "left rpm", minus ='
-        ' "right rpm", full = 100 }'
+        " it can only be looked at; log the rudder too (in NMEA 0183 the sentence RSA)"
     ),
     ("psi", "r"): (
         "no heading in this log: without it turning and drift cannot be told, and"

@@ -48,7 +48,27 @@ def turned(trial):
     return np.degrees(np.abs(apart).max())
 
 
+QUATERNION = [np.cos(PSI / 2), 0.0 * PSI, 0.0 * PSI, np.sin(PSI / 2)]
 ENU = np.pi / 2 - PSI
+EAST = [0.0 * PSI, 0.0 * PSI, np.sin(ENU / 2), np.cos(ENU / 2)]
+
+
+@pytest.mark.parametrize(
+    ("names", "columns", "frame"),
+    [
+        ([f"q[{k}]" for k in range(4)], QUATERNION, None),
+        (["q1", "q2", "q3", "q4"], QUATERNION, None),
+        ([f"pose.orientation.{k}" for k in "xyzw"], EAST, "enu"),
+        (["qw", "qx", "qy", "qz"], QUATERNION, None),
+    ],
+)
+def test_a_quaternion_is_a_heading(tmp_path, names, columns, frame):
+    rudder = [one.rudder for one in SHIP]
+    text = table(["t", *names, "Rudder"], T, *columns, rudder)
+    guess = guessed(tmp_path, text)
+    assert turned(guess.trial) < 0.3
+    assert guess.side.side == "starboard"
+    assert {one.name: one.value for one in guess.conventions}.get("frame") == frame
 
 
 @pytest.mark.parametrize("name", ["yaw", "orientation.yaw"])

@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import cache, lru_cache
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from shipgym.files import shipped_toml
 from shipgym.trials.clock_texts import unit_since_1970
 from shipgym.trials.column_values import without_sentinels
 from shipgym.trials.columns import ColumnGuess
+from shipgym.trials.guesses.steering import steering_command
 from shipgym.trials.readers.cell_texts import units_in_cell
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.units import (
@@ -152,6 +154,8 @@ _NO_MEASUREMENT = {
     *("std", "accuracy", "deviation", "variation", "raw", "quality", "status"),
     *("mode", "header"),
 }
+#: Last letters or numbers of the columns w, x, y and z of a quaternion.
+_QUATERNIONS = ("wxyz", "0123", "1234")
 
 
 @cache
@@ -187,12 +191,20 @@ def guess_columns(table: LogTable) -> list[ColumnGuess]:
             free.remove(found.name)
 
     for channel in known:
+        if channel == "n" and guesses.keys().isdisjoint(RUDDERS):
+            command = steering_command(table, free)
+            if command is not None:
+                guesses["delta"] = command
         is_speed_alone = channel == "v" and "u" not in guesses
         is_channel = channel in QUANTITIES and not is_speed_alone
         if is_channel:
             take(channel, channel)
     if "psi" not in guesses:
-        take("psi", "course")
+        attitude = _quaternion(table, free)
+        if attitude is None:
+            take("psi", "course")
+        else:
+            guesses["psi"] = attitude
     elif "cog" not in guesses:
         take("cog", "course")
     alone = "sog" if "cog" in guesses else "stw"
@@ -230,6 +242,31 @@ def _guess_speeds(table: LogTable, guesses: dict[str, ColumnGuess]) -> None:
     unit = "m/s" if largest <= fastest else "knots"
     for channel in unknown:
         guesses[channel] = replace(guesses[channel], unit=unit, reason=reason)
+
+
+def _quaternion(table: LogTable, free: list[str]) -> ColumnGuess | None:
+    """A heading of four columns of one name whose squares sum to 1; or None."""
+    for first, endings in product(free, _QUATERNIONS):
+        stem, found, bracket = first.rpartition(endings[0])
+        names = [stem + one + bracket for one in endings]
+        if not found or not set(names) <= {*free}:
+            continue
+        parts = [table.likely_numbers(name) for name in names]
+        known = [one for one in parts if one is not None]
+        if len(known) < 4:
+            continue
+        length = np.sum(np.square(known), axis=0)
+        is_unit = np.abs(length[np.isfinite(length)] - 1.0) < 0.02
+        moves = np.nanstd(known[0]) > 1e-6
+        if moves and np.mean(is_unit) > 0.99:
+            return ColumnGuess(
+                names[0],
+                "rad",
+                quaternion=tuple(names[1:]),
+                channel="psi",
+                reason="of a quaternion, whose four columns have length 1",
+            )
+    return None
 
 
 def _first_match(
