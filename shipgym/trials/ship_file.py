@@ -245,27 +245,23 @@ class ShipFile:
             undecided=undecided,
         )
 
-    def trials(self, use: str | None = None, *, decided: bool = True) -> list[Trial]:
-        """Read the trials of a use, by default all but those to skip.
+    def trials(self, *, decided: bool = True) -> list[Trial]:
+        """Read the trials but those to skip, in the order of the file.
 
-        In the order of the file. Raises InputError for anything wrong with a log and,
-        if `decided`, for the first line that is not decided.
+        Raises InputError for anything wrong with a log and, if `decided`, for the first
+        line that is not decided.
         """
         if decided and self.undecided:
             raise InputError(self.undecided[0])
-        if use is not None:
-            check_choice(use, USES, f"{self.path}: trials(use)")
-        return [
-            trial
-            for entry in self.entries
-            if entry.use == use or (use is None and entry.use != "skip")
-            for trial in self._read(entry)
-        ]
+        return [trial for entry in self._used for trial in self._read(entry)]
+
+    @property
+    def _used(self) -> list[TrialEntry]:
+        return [entry for entry in self.entries if entry.use != "skip"]
 
     def faults(self) -> list[str]:
         """What is left to decide, and what is wrong with each log; empty if nothing."""
-        used = [entry for entry in self.entries if entry.use != "skip"]
-        of_logs = [fault for entry in used for fault in self._faults(entry)]
+        of_logs = [fault for entry in self._used for fault in self._faults(entry)]
         return [*self.undecided, *of_logs]
 
     def _faults(self, entry: TrialEntry) -> list[str]:

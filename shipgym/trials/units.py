@@ -52,6 +52,18 @@ def si_factor(channel: str, unit: str, where: str = "unit") -> float:
     )
 
 
+def fitting_units(channel: str, declared: str, ratio: float, apart: float) -> list[str]:
+    """Units of a channel that are `ratio` times the declared one, the nearest first.
+
+    Their logarithm differs by less than `apart`.
+    """
+    factors = UNITS[QUANTITIES[channel]]
+    sought = ratio * factors[declared]
+    distances = {unit: abs(math.log(factors[unit] / sought)) for unit in factors}
+    nearest = sorted(factors, key=distances.__getitem__)
+    return [unit for unit in nearest if distances[unit] < apart]
+
+
 def check_channel(name: str, where: str, *, time: bool = True) -> str:
     """Return `name`, a channel of a file or, without `time`, of a trial."""
     # time is a column of a file, and no channel of a trial

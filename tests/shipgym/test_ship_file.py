@@ -148,14 +148,6 @@ def test_trials_are_read_with_the_file_s_conventions_or_their_own(folder):
     assert a["n"][0] == pytest.approx(10.0)
 
 
-def test_trials_can_be_asked_for_by_use(folder):
-    ship = ShipFile.load(folder / "ship.toml")
-    assert [trial.name for trial in ship.trials("fit")] == ["a.csv"]
-    assert [trial.name for trial in ship.trials(use="validate")] == ["runs/b.csv"]
-    with pytest.raises(InputError, match=r"fitting.*Did you mean 'fit'"):
-        ship.trials("fitting")
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

@@ -14,7 +14,7 @@ from shipgym.trials.columns import ColumnGuess, Locator
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.resampling import Log, changes, usual_step
-from shipgym.trials.units import DEGREE, QUANTITIES, UNITS, si_factor
+from shipgym.trials.units import DEGREE, fitting_units
 
 
 def rate_gain(t: Floats, psi: Floats, r: Floats) -> float:
@@ -78,12 +78,10 @@ def check_yaw_rate(log: Log, locator: Locator) -> None:
 def _nearest_units(gain: float, locator: Locator) -> list[tuple[str, str]]:
     """Units of which one would bring heading and yaw rate together, by channel."""
     fitting = []
-    for channel, power in (("psi", 1.0), ("r", -1.0)):
-        own = si_factor(channel, locator.columns[channel].unit)
-        for unit, factor in UNITS[QUANTITIES[channel]].items():
-            left = gain * (factor / own) ** power
-            if 0.5 < left < 2.0:
-                fitting.append((channel, unit))
+    for channel, ratio in (("psi", 1.0 / gain), ("r", gain)):
+        declared = locator.columns[channel].unit
+        for unit in fitting_units(channel, declared, ratio, apart=math.log(2.0)):
+            fitting.append((channel, unit))
     return fitting
 
 
@@ -217,7 +215,8 @@ def check_speed_units(log: Log, locator: Locator) -> None:
         column = locator.columns[channel]
         is_guess = isinstance(column, ColumnGuess) and not column.is_named
         largest = 0.3 if is_guess else 0.16
-        unit = _unit_instead(ratio, column.unit, largest)
+        units = fitting_units(channel, column.unit, ratio, largest)
+        unit = next(iter(units), "")
         is_usual = not is_guess and 0.6 < ratio < 1.67
         is_own = unit == column.unit
         if is_usual or is_own or not unit:
@@ -239,17 +238,6 @@ def _speeds(log: Log) -> dict[str, float]:
     if log.has("u"):
         speeds["u"] = np.hypot(channels["u"], channels.get("v", 0.0))
     return {name: float(np.median(np.abs(one))) for name, one in speeds.items()}
-
-
-def _unit_instead(ratio: float, declared: str, apart_at_most: float) -> str:
-    """Unit of a speed that is wrong by a ratio; empty where none fits."""
-    factors = UNITS["speed"]
-    sought = ratio * factors[declared]
-    apart = {}
-    for unit, factor in factors.items():
-        apart[unit] = abs(math.log(factor / sought))
-    nearest = min(apart, key=lambda unit: apart[unit])
-    return nearest if apart[nearest] < apart_at_most else ""
 
 
 def _usual_speed(log: Log) -> float:
