@@ -17,14 +17,13 @@ class Findings:
         """True where there are no problems."""
         return not self.problems
 
-    @property
-    def verdict(self) -> str:
-        """Soundness in words."""
-        return "sound" if self.ok else f"{len(self.problems)} problem(s)"
-
     def __str__(self) -> str:
         """Verdict, then a line for each problem and remark."""
-        lines = [f"{self.name}: {self.verdict}"]
+        problems, remarks = len(self.problems), len(self.remarks)
+        verdict = f"problems: {problems or 'none'}, remarks: {remarks or 'none'}"
+        if not problems + remarks:
+            verdict = "sound"
+        lines = [f"{self.name}: {verdict}"]
         lines += [f"  problem: {problem}" for problem in self.problems]
         lines += [f"  remark: {remark}" for remark in self.remarks]
         return "\n".join(lines)

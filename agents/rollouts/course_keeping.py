@@ -126,9 +126,13 @@ def _seeds(seeds: ArrayLike, n_models: int) -> Integers:
     numbers = np.atleast_1d(np.asarray(seeds))
     if numbers.dtype.kind not in "iu" or numbers.ndim != 1 or numbers.size == 0:
         raise unexpected("seeds", "integers in a row", seeds)
-    is_one = len(numbers) == 1
-    if is_one:
+    if len(numbers) == 1:
         return np.repeat(numbers, n_models)
+    if n_models not in (1, len(numbers)):
+        raise InputError(
+            f"seeds: expected one for each of {n_models} models, or one for all, got"
+            f" {len(numbers)}"
+        )
     return numbers
 
 

@@ -53,11 +53,14 @@ def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:
             " got others; use a ship such as 'tanker'"
         )
     step = model.travel_time / 40
-    longest = 300 * 40  # steps
     order = [0.0, -model.service_shaft_speed]
-    trial = simulate(model, np.tile(order, (longest, 1)), step, water_depth=water_depth)
-    at_rest = np.flatnonzero(trial["u"] <= 0.0)
-    if not at_rest.size:
+    for lengths in (30, 300):  # what she does astern after a short stop is not asked
+        orders = np.tile(order, (lengths * 40, 1))
+        trial = simulate(model, orders, step, water_depth=water_depth)
+        at_rest = np.flatnonzero(trial["u"] <= 0.0)
+        if at_rest.size:
+            break
+    else:
         raise ManoeuvreError(
             f"crash stop of {model.name!r}: expected a ship at rest, got"
             f" {trial['u'][-1]:.3g} m/s after {trial.duration:.0f} s",

@@ -142,3 +142,9 @@ def test_a_model_found_unstable_is_steered_only_where_asked():
         asked = sail(PILOT, marked, task=SHORT, allow_unstable=True)
     plain = sail(PILOT, MARINER, task=SHORT)
     np.testing.assert_array_equal(asked.cost, plain.cost)
+
+
+def test_seeds_are_one_for_each_model_or_for_all():
+    ships = [MARINER, TURNED, MARINER]
+    with pytest.raises(InputError, match=r"seeds: .* each of 3 models, .* got 2"):
+        sail(PILOT, ships, SHORT, seeds=[0, 1])

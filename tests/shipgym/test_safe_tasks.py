@@ -75,7 +75,9 @@ def test_what_fails_late_is_told_with_line_lane_and_step(tmp_path, monkeypatch):
 
 def test_positive_rewards_and_prints_are_asked_about(tmp_path):
     path, _ = late(tmp_path)
-    printed, positive = check_task(path, **SHIP).remarks
+    found = check_task(path, **SHIP)
+    assert "problems: none, remarks: 2" in str(found)
+    printed, positive = found.remarks
     assert "in step: expected no print" in printed
     assert "reward_cross_track: expected costs, written with a minus" in positive
     assert "100 % of the steps, up to 1: are these costs?" in positive
