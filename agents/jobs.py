@@ -6,9 +6,10 @@ has one thread, and jobs and results pass through JSON in every case.
 
 import json
 import os
+import signal
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import chdir, closing, contextmanager
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from agents.controllers.registry import registered_modules
 from agents.job_results import JobFunction, KeptResults, result_to_json
+from identification.progress import PROGRESS
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
 from shipgym.extras import library
@@ -29,8 +31,6 @@ from shipgym.python_files import working_folder
 
 __all__ = ["HERE", "JobEngine", "JobError", "run_jobs"]
 
-#: Called with the number of jobs done and their total.
-JobProgress = Callable[[int, int], None]
 #: A job and its result as JSON, in the order in which jobs finish.
 Finished = Iterator[tuple[str, str]]
 
@@ -87,7 +87,6 @@ def run_jobs(
     function: JobFunction,
     jobs: Sequence[Mapping[str, Any]],
     where: JobEngine = HERE,
-    progress: JobProgress | None = None,
 ) -> list[Any]:
     """Run independent jobs and return their results in the order of the jobs.
 
@@ -104,8 +103,6 @@ def run_jobs(
         What JSON holds. Equal jobs run once.
     where : JobEngine
         Where the jobs run; by default one after the other, in this process.
-    progress : callable, optional
-        Called with the number of jobs done and their total.
     """
     texts = [json.dumps(job, allow_nan=False) for job in jobs]
     kept = None if where.keep is None else KeptResults(where.keep, function)
@@ -117,10 +114,10 @@ def run_jobs(
     pending = [text for text in dict.fromkeys(texts) if text not in results]
 
     def report() -> None:
-        if progress is not None:
-            n_done = sum(text in results for text in texts)
-            progress(n_done, len(texts))
+        n_done = sum(text in results for text in texts)
+        tell("jobs done", n_done, len(texts))
 
+    tell = PROGRESS.get()
     report()
     for text, result in _finished(function, pending, where):
         results[text] = result
@@ -191,7 +188,7 @@ def _in_processes(function: JobFunction, texts: list[str], workers: int) -> Fini
         pre_dispatch=workers,
     )
     try:
-        with _environment({"PYTHONSAFEPATH": "1"}):
+        with _environment({"PYTHONSAFEPATH": "1"}), _deaf():
             results = run(_calls(function, texts))
         with warnings.catch_warnings(), closing(results) as finished:
             warnings.filterwarnings("ignore", ".*tasks which were still being")
@@ -203,6 +200,19 @@ def _in_processes(function: JobFunction, texts: list[str], workers: int) -> Fini
         raise _killed_worker() from None
     finally:
         get_reusable_executor().shutdown(wait=True, kill_workers=True)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Start processes that do not hear of Ctrl-C: this one ends them."""
+    if not hasattr(signal, "pthread_sigmask"):  # on Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _on_ray(function: JobFunction, texts: list[str], where: JobEngine) -> Finished:

@@ -166,6 +166,8 @@ def check_new(folder: Path, resume: bool) -> Path:
     Raises InputError saying what to do.
     """
     _pyarrow()  # a missing extra is reported now, not after the work
+    if resume and not folder.exists():
+        raise InputError(f"{folder}: no results are there; leave --resume out to begin")
     check_results(folder, (RESULTS, EPISODES, PARTS), resume)
     return folder
 

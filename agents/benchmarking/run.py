@@ -3,7 +3,6 @@
 import shutil
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,6 @@ from agents.suites.suite import (
     BenchmarkTask,
     load_suite,
 )
-from identification.progress import Progress
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
 
@@ -31,7 +29,6 @@ def benchmark(
     out: str | Path | None = None,
     workers: int | None = 1,
     engine: str = "local",
-    progress: Progress | None = None,
     *,
     address: str | None = None,
     resume: bool = False,
@@ -61,8 +58,6 @@ def benchmark(
     workers, engine, address
         Where the work is done (`run_jobs`); controllers given as objects steer in this
         process.
-    progress : callable, optional
-        Called with what is done, how many of it, and the total.
     resume : bool
         Go on in a folder of results: what is there already is not run again.
     episodes : int
@@ -94,8 +89,7 @@ def benchmark(
                 jobs[entry.name, task.name] = job_of(entry, task, options)
             else:  # no other process can make objects
                 cells[entry.name, task.name] = run_cell(entry, task, options)
-        on_progress = progress and partial(progress, "tasks done")
-        results = run_jobs(run_job, list(jobs.values()), where, on_progress)
+        results = run_jobs(run_job, list(jobs.values()), where)
         for name, result in zip(jobs, results, strict=True):
             cells[name] = read_cell(result)
         names = {task: rule.name for task, rule in rules.items()}

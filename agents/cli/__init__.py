@@ -12,9 +12,11 @@ import sys
 try:
     import signal
     import warnings
+    from _thread import interrupt_main
     from collections.abc import Callable
     from io import TextIOWrapper
     from pathlib import Path
+    from threading import Timer
     from typing import Annotated, Any
 
     import typer
@@ -147,6 +149,17 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     warn(str(message))
 
 
+def _unraisable(failed: Any) -> None:
+    """Interrupt again after a function that a library in C called, as LLVM does.
+
+    Python would print a traceback there and go on.
+    """
+    if failed.exc_type is KeyboardInterrupt:
+        Timer(0.1, interrupt_main).start()
+    else:
+        sys.__unraisablehook__(failed)
+
+
 def main() -> None:
     """Run the command line."""
     for stream in (sys.stdout, sys.stderr):
@@ -156,6 +169,7 @@ def main() -> None:
     warnings.showwarning = _show_warning  # names in it come from files
     # joblib's, of a job that ended with an error, which is said anyway
     warnings.filterwarnings("ignore", "A worker stopped while some jobs")
+    sys.unraisablehook = _unraisable
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # clean up as on Ctrl-C
     try:
         app(prog_name="shipgym")

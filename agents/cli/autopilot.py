@@ -12,6 +12,7 @@ from agents.cli.command import (
     FAILED,
     ShipFileArgument,
     fail,
+    interrupted,
 )
 from agents.cli.identify_options import with_identify_options
 from shipgym.manoeuvres.quantiles import DRAWS
@@ -54,22 +55,27 @@ def autopilot_command(
     the report then says why.
     """
     from agents.cli.terminal import progress_bars
+    from agents.output import present
     from agents.verification.chain import build_autopilot
     from agents.verification.verify import DESIGNS
 
     designs: Sequence[str] = DESIGNS
     if autopilots is not None:
         designs = [name.strip() for name in autopilots.split(",")]
-    with progress_bars() as on_progress:
-        result = build_autopilot(
-            ship,
-            out,
-            draws=draws,
-            seed=seed,
-            options=options,
-            designs=designs,
-            progress=on_progress,
-        )
+    try:
+        with progress_bars():
+            result = build_autopilot(
+                ship,
+                out,
+                draws=draws,
+                seed=seed,
+                options=options,
+                designs=designs,
+            )
+    except KeyboardInterrupt:
+        if not out.is_dir() or present(out) != ["model.json"]:
+            raise
+        interrupted(f"the model is identified, and kept in {out}; begin again with")
     print_autopilot(result, out / "report.html", draws)
 
 

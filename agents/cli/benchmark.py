@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Option
 
 from agents.cli.command import (
-    INTERRUPTED,
     Address,
     AllowCode,
     EngineName,
     Out,
-    fail,
+    interrupted,
 )
 
 if TYPE_CHECKING:
@@ -70,6 +69,7 @@ def benchmark_command(
     """Rank controllers on the tasks of a suite. All run the same episodes."""
     from agents.benchmarking.entries import names_code, read_entries
     from agents.benchmarking.page import write_page
+    from agents.benchmarking.results import PARTS
     from agents.benchmarking.run import benchmark
     from agents.cli.terminal import progress_bars, warn
 
@@ -82,7 +82,7 @@ def benchmark_command(
             )
     entries = read_entries(controllers)
     try:
-        with progress_bars() as progress:
+        with progress_bars():
             result = benchmark(
                 entries,
                 suite,
@@ -90,7 +90,6 @@ def benchmark_command(
                 out,
                 workers,
                 engine,
-                progress,
                 address=address,
                 resume=resume,
                 episodes=episodes,
@@ -101,10 +100,10 @@ def benchmark_command(
         if page:
             write_page(result, out / "index.html")
     except KeyboardInterrupt:
-        fail(
-            f"interrupted; what was done is kept in {out}: continue with --resume",
-            INTERRUPTED,
-        )
+        done = len(list((out / PARTS).glob("*.json")))
+        if not done:
+            raise
+        interrupted(f"finished jobs kept in {out}: {done}; go on with", "--resume")
     _print_result(result, out)
 
 

@@ -3,8 +3,10 @@
 import functools
 import inspect
 import os
+import shlex
 import sys
 from collections.abc import Callable
+from contextvars import ContextVar
 from errno import EBADF, ENOSPC, EPIPE
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -16,6 +18,8 @@ from typer.core import TyperGroup
 from agents.cli.parameters import take_parameters, typed_parameters
 
 FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130  # exit codes
+#: Words of the command line after `shipgym`.
+GIVEN: ContextVar[tuple[str, ...]] = ContextVar("given", default=())
 
 ShipFileArgument = Annotated[
     Path, Argument(metavar="SHIP.TOML", help="The ship file with its trials.")
@@ -46,6 +50,7 @@ class CommandGroup(TyperGroup):
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:
         """Refuse arguments that are empty."""
+        GIVEN.set(tuple(args))
         for text in args:
             name, sign, value = text.partition("=")
             if not text or (sign and not value and name.startswith("--")):
@@ -81,6 +86,17 @@ def shared_options(command: Callable[..., None]) -> Callable[..., None]:
             annotation=annotation,
         )
     return take_parameters(wrapped, parameters)
+
+
+def interrupted(kept: str, *more: str) -> NoReturn:
+    """Leave after an interruption: say what is kept, and the command that goes on.
+
+    `kept`: ends before the command; `more`: words that the command needs now.
+    """
+    given = GIVEN.get()
+    new = [word for word in more if word not in given]
+    command = shlex.join(["shipgym", *given, *new])
+    fail(f"interrupted; {kept}: {command}", INTERRUPTED)
 
 
 def report(error: Exception) -> int | None:

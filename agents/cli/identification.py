@@ -39,14 +39,14 @@ def identify_command(
     Exits with 1 if the identified model is unstable, or predicts nothing.
     """
     from agents.cli.tables import prediction_table, selection_table
-    from agents.cli.terminal import answer, console, identifying, say
+    from agents.cli.terminal import answer, console, progress_bars, say
     from agents.identifying import identify_ship
     from agents.output import whole_folder
     from identification.judging.warnings import held_out_error, why_unstable
     from identification.pipeline.result import FILES
 
     read, settings = _chosen(ship, options)
-    with whole_folder(out, FILES) as draft, identifying("identifying"):
+    with whole_folder(out, FILES) as draft, progress_bars("identifying"):
         result = identify_ship(read, settings)
         result.save(draft)
         if report:
@@ -126,12 +126,12 @@ def advise_command(
     Prints by how much zigzags and turning circles, simulated
     on the model identified so far, would each reduce the error of a coefficient.
     """
-    from agents.cli.terminal import answer, identifying, say
+    from agents.cli.terminal import answer, progress_bars, say
     from agents.identifying import identify_ship
     from identification.design.experiment import advise
 
     read, settings = _chosen(ship, options, "abkowitz")
-    with identifying("identifying"):
+    with progress_bars("identifying"):
         result = identify_ship(read, settings)
         used = [trial for trial in result.trials if trial.use == "fit"]
         advice = advise(result.model, used, None, coefficient, number)
@@ -157,7 +157,7 @@ def reduce_command(
     the reduced model is unstable.
     """
     from agents.cli.tables import prediction_table
-    from agents.cli.terminal import answer, console, identifying, say
+    from agents.cli.terminal import answer, console, progress_bars, say
     from agents.identifying import reduce_ship
     from agents.output import whole_folder
     from identification.pipeline.result import FILES
@@ -166,7 +166,7 @@ def reduce_command(
     read, settings = _chosen(ship, options, "abkowitz")
     with (
         whole_folder(out, (*FILES, "reduction.json")) as draft,
-        identifying("reducing"),
+        progress_bars("reducing"),
     ):
         found = reduce_ship(read, settings, tolerance)
         fields = found.to_dict()

@@ -1,9 +1,10 @@
 """Standard manoeuvres of a model for `shipgym trials`: runs, indices, criteria."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
+from identification.progress import counted
 from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 from shipgym.manoeuvres import Criterion, IndexInterval, Manoeuvre
 from shipgym.manoeuvres.imo import imo_criteria
@@ -54,12 +55,7 @@ class StandardTrials:
         }
 
 
-def standard_trials(
-    model: ShipModel,
-    draws: int = 0,
-    seed: int = 0,
-    progress: Callable[[int], None] | None = None,
-) -> StandardTrials:
+def standard_trials(model: ShipModel, draws: int = 0, seed: int = 0) -> StandardTrials:
     """Simulate the standard manoeuvres of a ship, with its model and with draws of it.
 
     A manoeuvre that cannot be simulated, or has no indices, is in `refused`. Raises
@@ -73,8 +69,6 @@ def standard_trials(
         Models drawn from the covariance; a model without one has none.
     seed : int
         Seed of the draws.
-    progress : callable, optional
-        Called with the number of draws done.
     """
     families = families_of(model)
     manoeuvres: dict[str, Manoeuvre] = {}
@@ -86,7 +80,8 @@ def standard_trials(
     if draws and model.covariance is not None:
         drawn = model.sample(draws, seed)
     evaluate = {name: manoeuvre.evaluate for name, manoeuvre in manoeuvres.items()}
-    indices = intervals_of(nominal.indices, drawn, evaluate, progress)
+    sailed = counted("models drawn", drawn)
+    indices = intervals_of(nominal.indices, sailed, evaluate)
     return StandardTrials(
         families=families,
         runs=nominal.runs,

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
-from time import monotonic
+from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.segment import Segment
 from rich.text import Text
 
+from shipgym.engine.compiling import TELL
+
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars
+    from rich.progress import Task
 
     from agents.training.evaluation import TrainingProgress
-    from identification.progress import Progress
 
 #: Control characters but tab and newline, and those that turn the direction of writing.
 CONTROL_CODES = (
@@ -49,6 +52,7 @@ class PlainConsole(Console):
 
 
 MINUTE = 60.0  # s
+FIRST_LINE = 10.0  # s, after which the first line of progress is printed
 AS_JSON: ContextVar[bool] = ContextVar("as_json", default=False)
 console = PlainConsole(width=None if sys.stdout.isatty() else 160)
 err = PlainConsole(stderr=True)
@@ -109,60 +113,71 @@ def _bars() -> Bars:
         TaskProgressColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
         console=err,
+        speed_estimate_period=3600.0,
     )
 
 
 @contextmanager
-def progress_bars() -> Iterator[Progress]:
-    """Bars on standard error, one for each stage, with the remaining time.
+def progress_bars(stage: str = "") -> Iterator[None]:
+    """Show on standard error what `PROGRESS` is told while the block lasts.
 
-    Yields a function that is called with the stage, the units done and their total, 0
-    where that is unknown; with `--json` and `--quiet` it shows nothing. Off a terminal
-    a line a minute says how far the work is.
+    Bars, one for each stage, with the remaining time, the first perhaps of a `stage`
+    without a total; nothing with `--json` and `--quiet`. Off a terminal a line a minute
+    says how far the work is, and others what is compiled.
     """
-    if console.quiet:
-        yield lambda *_: None
-        return
-    if not err.is_terminal:
-        yield _line_a_minute()
-        return
-    with _bars() as bars:
-        tasks: dict[str, Any] = {}
+    from identification.progress import PROGRESS
 
-        def on_progress(stage: str, done: int, total: int) -> None:
-            if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=None)
-            bars.update(tasks[stage], completed=done, total=total or None)
+    bars = _bars()
+    tasks: dict[str, Any] = {}
 
-        yield on_progress
+    def on_progress(name: str, done: int, total: int) -> None:
+        if name not in tasks:
+            tasks[name] = bars.add_task(name, total=None)
+        bars.update(tasks[name], completed=done, total=total or None)
 
-
-def _line_a_minute() -> Progress:
-    """Progress in lines, the first after a minute."""
-    told = monotonic()
-
-    def on_progress(stage: str, done: int, total: int) -> None:
-        nonlocal told
-        if monotonic() - told >= MINUTE:
-            told = monotonic()
-            share = f": {done} of {total}" if total else ""
-            err.print(f"{stage}{share}", soft_wrap=True)
-
-    return on_progress
+    shown = bars if err.is_terminal else _lines(bars)
+    token = PROGRESS.set(on_progress)
+    try:
+        with nullcontext() if console.quiet else shown:
+            if stage:
+                on_progress(stage, 0, 0)
+            yield
+    finally:
+        PROGRESS.reset(token)
 
 
 @contextmanager
-def identifying(stage: str) -> Iterator[None]:
-    """Bars of an identification: one without a total, one for each part with one."""
-    from identification.progress import PROGRESS
+def _lines(bars: Bars) -> Iterator[None]:
+    """Print once a minute how far the last of the stages is."""
+    over = Event()
 
-    with progress_bars() as on_progress:
-        token = PROGRESS.set(on_progress)
-        on_progress(stage, 0, 0)
-        try:
-            yield
-        finally:
-            PROGRESS.reset(token)
+    def tell() -> None:
+        wait = FIRST_LINE
+        while not over.wait(wait):
+            wait = MINUTE
+            for stage in bars.tasks[-1:]:
+                err.print(_how_far(stage), soft_wrap=True)
+
+    teller = Thread(target=tell, daemon=True)
+    teller.start()
+    os.environ[TELL] = "1"
+    try:
+        yield
+    finally:
+        del os.environ[TELL]
+        over.set()
+        teller.join()
+
+
+def _how_far(stage: Task) -> str:
+    """Units done, the time that they took, and the remaining time where it is known."""
+    parts = [stage.description]
+    if stage.total:
+        parts.append(f"{stage.completed:,.0f} of {stage.total:,.0f}")
+    parts.append(f"{stage.elapsed:.0f} s so far")
+    if stage.time_remaining:
+        parts.append(f"about {stage.time_remaining:.0f} s left")
+    return ", ".join(parts)
 
 
 @contextmanager
@@ -171,10 +186,13 @@ def training_bar() -> Iterator[Callable[[TrainingProgress], None]]:
 
     Yields a function that is called with the progress.
     """
-    with progress_bars() as bars:
+    from identification.progress import PROGRESS
+
+    with progress_bars():
+        tell = PROGRESS.get()
 
         def on_progress(now: TrainingProgress) -> None:
-            bars("training", now.steps, now.total)
+            tell("training", now.steps, now.total)
             if now.evaluated and not console.quiet:
                 name, best = min(now.yardsticks.items(), key=lambda one: one[1])
                 err.print(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
-from agents.cli.command import INTERRUPTED, fail
+from agents.cli.command import interrupted
 from agents.cli.parameters import with_options
 
 if TYPE_CHECKING:
@@ -123,17 +122,17 @@ def train_command(
 
 def _train(plan: TrainingPlan, out: Path, resume: bool) -> TrainingResult:
     from agents.cli.terminal import training_bar
-    from agents.training.run_folder import CHECKPOINT
+    from agents.training.run_folder import RUN
     from agents.training.training import train
 
     try:
         with training_bar() as on_progress:
             return train(plan, out, resume=resume, on_progress=on_progress)
     except KeyboardInterrupt:
-        message = "interrupted"
-        if (out / CHECKPOINT).is_file():
-            message += "; continue with the same command and --resume"
-        fail(message, INTERRUPTED)
+        if not (out / RUN).is_file():
+            raise
+        kept = "what was learned up to the last save"
+        interrupted(f"{kept} is kept in {out}; go on with", "--resume")
 
 
 def _print_result(result: TrainingResult, out: Path) -> None:
@@ -145,7 +144,9 @@ def _print_result(result: TrainingResult, out: Path) -> None:
     answer({**result.to_dict(), "agent": str(agent)})
     if result.resumed_from is not None:
         say(f"resumed at step {result.resumed_from:,}")
-    table = plain_table("Mean cost of an episode held out", "", ">cost")
+    table = plain_table(
+        "Mean cost of an episode held out, the lower the better", "", ">cost"
+    )
     first, last, best = result.curve[0], result.curve[-1], result.best
     costs = {
         "before training": first["cost"],
@@ -155,10 +156,12 @@ def _print_result(result: TrainingResult, out: Path) -> None:
     for name, cost in costs.items():
         table.add_row(name, f"{cost:.6g}")
     console.print(table)
-    if best["cost"] >= min(first["cost"], *result.yardsticks.values()):
+    others = {"the agent before training": first["cost"], **result.yardsticks}
+    name = min(others, key=lambda one: others[one])
+    if best["cost"] >= others[name]:
         say(
-            "nothing better was learned than what was there: train for more steps, or"
-            " see shipgym train --help for rewards and settings"
+            f"the agent is no better than {name}: train it for more steps"
+            " (--total-steps), or with other settings (--set)"
         )
     say(f"written: {agent}")
 
@@ -184,23 +187,21 @@ def tune_command(
     """
     from agents.cli.terminal import progress_bars
     from agents.training.plan import make_plan
-    from agents.training.tuning import tune
+    from agents.training.tuning import STUDY, tune
 
     plan = make_plan(**asked, seed=seed)
     try:
-        with progress_bars() as bars:
+        with progress_bars():
             study = tune(
                 plan,
                 out,
                 trials,
                 fixed=asked["settings"],
-                on_progress=partial(bars, "trials"),
             )
     except KeyboardInterrupt:
-        fail(
-            "interrupted; the same command continues with the trials that are not done",
-            INTERRUPTED,
-        )
+        if not (out / STUDY).is_file():
+            raise
+        interrupted(f"trials that have ended are kept in {out}; go on with")
     print_tuning(study, out)
 
 

@@ -41,12 +41,8 @@ def trials_command(
     if out is not None:
         check_page(out, plots=True)
 
-    with progress_bars() as bars:
-
-        def on_progress(done: int) -> None:
-            bars("models drawn", done, draws)
-
-        trials = standard_trials(ship, draws, seed, on_progress)
+    with progress_bars():
+        trials = standard_trials(ship, draws, seed)
 
     if out is not None:
         write_page(ship, trials, out)

@@ -118,10 +118,6 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
         self.save_seconds = save_seconds
         self.held_out = HeldOut(plan.task, EVALUATION_SEED, episodes)
         self.agent = make_agent(plan, design_base(plan.settings.base, plan.task))
-        log = []
-        if folder is not None and find_spec("tensorboard"):
-            log.append(TensorBoardOutputFormat(str(folder / run_folder.TENSORBOARD)))
-        self.agent.set_logger(Logger(None, log))
         self.policy: Any = None
         self.curve: list[dict[str, Any]] = []
         self.saved_at = -np.inf
@@ -144,6 +140,11 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
 
     def learn(self) -> TrainingResult:
         """Learn to the end."""
+        log = []
+        if self.folder is not None and find_spec("tensorboard"):
+            path = self.folder / run_folder.TENSORBOARD
+            log.append(TensorBoardOutputFormat(str(path)))
+        self.agent.set_logger(Logger(None, log))
         left = self.plan.settings.total_steps - self.steps
         try:
             if left > 0:

@@ -6,7 +6,7 @@ early by the median rule (Golovin et al. 2017, Google Vizier, section 3.1).
 """
 
 import json
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from agents.output import check_results, in_use
 from agents.training.evaluation import TrainingProgress
 from agents.training.plan import TrainingPlan, check_same
 from agents.training.settings import suggested
+from identification.progress import PROGRESS
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
 from shipgym.extras import library
@@ -34,7 +35,6 @@ def tune(
     trials: int = 20,
     *,
     fixed: Collection[str] = (),
-    on_progress: Callable[[int, int], None] | None = None,
 ) -> Any:
     """Search the settings with which an agent learns a task best, or go on with it.
 
@@ -53,8 +53,6 @@ def tune(
         In all, with those done before.
     fixed : collection of str
         Settings that are left as they are.
-    on_progress : callable, optional
-        Called with the trials done and their total.
     """
     check_whole(trials, "trials", at_least=1)
     every = max(1, plan.settings.total_steps // EVALUATIONS)
@@ -73,8 +71,7 @@ def tune(
         finished = trial.state is optuna.trial.TrialState.COMPLETE
         if finished and study.best_trial.number == trial.number:
             _write_best(folder, plan, trial)
-        if on_progress is not None:
-            on_progress(_ended(study), trials)
+        PROGRESS.get()("trials", _ended(study), trials)
 
     with in_use(folder):
         study = open_study(folder, plan, fixed)

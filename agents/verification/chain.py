@@ -5,20 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from agents.controllers.registry import controller_class, controller_kinds
 from agents.identifying import identification_settings, trials_of
-from agents.output import whole_folder
+from agents.output import present, whole_folder
 from agents.verification.refusal import refused_designs, why_refused
 from agents.verification.result import AutopilotResult, Pilot, Verification
 from agents.verification.tracks import Track
 from agents.verification.verify import DESIGNS, verify
 from identification import IdentificationResult, identify
 from identification.judging.warnings import why_unstable
-from identification.progress import PROGRESS, Progress
+from identification.progress import PROGRESS
 from shipgym.checks import check_number, placed
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.files import write_json
@@ -39,63 +38,54 @@ def build_autopilot(
     seed: int = 0,
     options: Mapping[str, Any] | None = None,
     designs: Sequence[str] = DESIGNS,
-    progress: Progress | None = None,
 ) -> AutopilotResult:
     """Identify a ship from trials, design and verify autopilots, write the report.
 
     The folder holds `report.html`, `metrics.json`, `model.json` and a file of each
     autopilot, such as `lq.json`; where the model is unstable or refused only the first
-    two, and no file of an autopilot that is refused. It is written whole or not at all.
-    `ship_file`: the ship file (TOML) with its trials; `out`: folder of the results; an
-    earlier report there is replaced, anything else is refused; `draws`: number of
-    models drawn from the coefficient covariance, at least 2; `seed`: of the draws and
-    of the episodes; `options`: of `identify`, by name, trials by file; those not given
-    are the ship file's; `designs`: kinds of controller to design, of which those that
-    lead another one keep to a track; `progress`: called as the work goes on. Raises
-    InputError for anything wrong with the files or arguments; nothing is written then.
+    two, and no file of an autopilot that is refused. It is written whole or not at all;
+    only the model is left in an empty folder by an interruption. `ship_file`: the ship
+    file (TOML) with its trials; `out`: folder of the results; an earlier report there
+    is replaced, anything else is refused; `draws`: number of models drawn from the
+    coefficient covariance, at least 2; `seed`: of the draws and of the episodes;
+    `options`: of `identify`, by name, trials by file; those not given are the ship
+    file's; `designs`: kinds of controller to design, of which those that lead another
+    one keep to a track. Raises InputError for anything wrong with the files or
+    arguments; nothing is written then.
     """
     check_number(draws, "draws", at_least=2)
     check_number(seed, "seed", at_least=0, at_most=2**32)
     for kind in designs:
         controller_class(kind, "autopilots")
     graph_objects()  # a missing extra is reported now, not after the work
-    tell = progress or (lambda *_: None)
     files = (*FILES, *(f"{kind}.json" for kind in controller_kinds()))
-    with whole_folder(Path(out), files) as draft:
-        with stage(tell, "reading trials"):
+    folder = Path(out)
+    with whole_folder(folder, files) as draft:
+        with stage("reading trials"):
             ship = ShipFile.load(ship_file)
             settings = identification_settings(ship, options or {})
             trials, arguments = trials_of(ship, settings)
-        with stage(tell, "identifying"), placed(str(ship.path)):
+        with stage("identifying"), placed(str(ship.path)):
             fit = identify(trials, **arguments)
-        result = examined(
-            ship,
-            fit,
-            partial(
-                verify,
-                fit.model,
-                int(draws),
-                int(seed),
-                tell,
-                designs,
-                fit.trials,
-            ),
-        )
-        with stage(tell, "writing the report"):
+
+        def verified() -> Verification:
+            if not present(folder):  # an interruption leaves the model there
+                fit.model.save(folder / "model.json")
+            return verify(fit.model, int(draws), int(seed), designs, fit.trials)
+
+        result = examined(ship, fit, verified)
+        with stage("writing the report"):
             write_agents(result, draft)
             write_findings(result, draft)
     return result
 
 
 @contextmanager
-def stage(tell: Progress, name: str) -> Iterator[None]:
-    """Work of one unit; `tell` hears of its beginning, its parts and its end."""
+def stage(name: str) -> Iterator[None]:
+    """Work of one unit; `PROGRESS` hears of its beginning and its end."""
+    tell = PROGRESS.get()
     tell(name, 0, 1)
-    before = PROGRESS.set(tell)
-    try:
-        yield
-    finally:
-        PROGRESS.reset(before)
+    yield
     tell(name, 1, 1)
 
 

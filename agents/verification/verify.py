@@ -15,7 +15,7 @@ from agents.rollouts.course_keeping import Episodes, step_response
 from agents.verification.closed_loop import ClosedLoop, lost_tracks
 from agents.verification.result import STEP_DEG, Pilot, Verification
 from agents.verification.tracks import track_task
-from identification.progress import Progress
+from identification.progress import counted
 from shipgym.arrays import Flags
 from shipgym.checks import quoted
 from shipgym.errors import InputError
@@ -33,18 +33,16 @@ def verify(
     model: ShipModel,
     draws: int,
     seed: int,
-    tell: Progress = lambda *_: None,
     designs: Sequence[str] = DESIGNS,
     trials: Sequence[Trial] = (),
 ) -> Verification:
     """Design autopilots on a model and run them over models drawn from its covariance.
 
     `model`: with a covariance;
-    `draws`, `seed`, `designs`: see `build_autopilot`; `tell`: called with the
-    progress; `trials`: that the ship was put through: a model drawn that runs away in
-    one of them does not count. Raises InputError if no autopilot can be designed on it.
+    `draws`, `seed`, `designs`: see `build_autopilot`; `trials`: that the ship was put
+    through: a model drawn that runs away in one of them does not count. Raises
+    InputError if no autopilot can be designed on it.
     """
-    tell("models drawn", 0, draws)
     designed = design_autopilots(model, designs)
     loop = ClosedLoop(
         model=model,
@@ -52,7 +50,7 @@ def verify(
         seeds=seed + np.arange(draws),
         trials=trials,
     )
-    criteria = _assessed(loop, tell)
+    criteria = _assessed(loop)
     unstable = ran_away(criteria)
     stable = [loop.draws[number] for number in np.flatnonzero(~unstable).tolist()]
 
@@ -60,7 +58,7 @@ def verify(
     for track in tracks:
         loop.look_at(lost_tracks(track))
     steered = sailed(loop, designed.controllers)
-    pilots = run_pilots(steered, [model, *stable], tell)
+    pilots = run_pilots(steered, [model, *stable])
     return Verification(
         draws=draws,
         seed=seed,
@@ -75,12 +73,9 @@ def verify(
     )
 
 
-def _assessed(loop: ClosedLoop, tell: Progress) -> dict[str, Criterion]:
+def _assessed(loop: ClosedLoop) -> dict[str, Criterion]:
     """Criteria that the models can be held against."""
-    draws = loop.draws
-    found = assess_draws(
-        loop.model, draws, lambda done: tell("models drawn", done, len(draws))
-    )
+    found = assess_draws(loop.model, counted("models drawn", loop.draws))
     return {name: one for name, one in found.items() if one.drawn is not None}
 
 
@@ -113,16 +108,12 @@ def keeps_course(model: ShipModel) -> bool:
 def run_pilots(
     steered: Sequence[tuple[Controller, Episodes]],
     ships: Sequence[ShipModel],
-    tell: Progress,
 ) -> list[Pilot]:
     """Autopilots with the episodes of each and its step responses on ships."""
-    n = len(steered)
     pilots = []
-    for i, (autopilot, episodes) in enumerate(steered):
-        tell("step responses", i, n)
+    for autopilot, episodes in counted("step responses", steered):
         step = step_response(autopilot, ships, STEP_DEG)
         pilots.append(Pilot(autopilot.kind, autopilot, episodes, step))
-    tell("step responses", n, n)
     return pilots
 
 

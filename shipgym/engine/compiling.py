@@ -29,6 +29,9 @@ SEMANTICS = {"error_model": "numpy", "fastmath": {"contract"}}
 # Numba's own functions leave variables unset where they raise
 NOT_OF_NUMBA = r"(?!(?s:.*)-packages[\\/]numba[\\/])"
 
+#: Variable of the environment with which waiting is told off a terminal too.
+TELL = "SHIPGYM_TELL"
+
 #: Compiled functions that loops call, by all that they depend on: loops share them.
 SHARED: dict[Any, Any] = {}
 
@@ -159,6 +162,6 @@ def _named(copy: Any) -> Any:
 
 
 def tell_who_waits(words: str) -> None:
-    """Print a line for a person at a terminal or a notebook, not for programs."""
-    if "ipykernel" in sys.modules or sys.stderr.isatty():
+    """Print a line for a person at a terminal or a notebook, or where `TELL` is set."""
+    if "ipykernel" in sys.modules or sys.stderr.isatty() or TELL in os.environ:
         print(words, file=sys.stderr, flush=True)

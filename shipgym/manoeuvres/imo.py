@@ -1,6 +1,6 @@
 """Assessment of a ship by the manoeuvring criteria of MSC.137(76)."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -53,22 +53,12 @@ def imo_assessment(
     return assess_draws(model, draws)
 
 
-def assess_draws(
-    model: ShipModel,
-    draws: Sequence[ShipModel],
-    progress: Callable[[int], None] | None = None,
-) -> Assessment:
-    """The criteria of a model and of models drawn; `progress` is told of how many."""
+def assess_draws(model: ShipModel, draws: Iterable[ShipModel]) -> Assessment:
+    """The criteria of a model and of models drawn."""
     needed = imo_manoeuvres(model)
     own = own_indices(model, needed)
     evaluations = {name: test.evaluate for name, test in needed.items()}
-    found = intervals_of(
-        own,
-        draws,
-        evaluations,
-        progress,
-    )
-    return imo_criteria(model, found)
+    return imo_criteria(model, intervals_of(own, draws, evaluations))
 
 
 def imo_criteria(

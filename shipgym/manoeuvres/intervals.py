@@ -1,6 +1,6 @@
 """Uncertainty of an identified ship's indices, by models drawn from its covariance."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -179,22 +179,18 @@ def own_indices(
 
 def intervals_of(
     own: Indices,
-    draws: Sequence[ShipModel],
+    draws: Iterable[ShipModel],
     evaluations: Mapping[str, Evaluation],
-    progress: Callable[[int], None] | None = None,
 ) -> dict[str, dict[str, IndexInterval]]:
     """Indices of several manoeuvres over the same draws, by manoeuvre and index.
 
     `own` are those of the model itself, `evaluations` give them from a ship; both by
-    manoeuvre. Without draws the values stand alone. `progress` is called with the
-    number of draws done.
+    manoeuvre. Without draws the values stand alone.
     """
     outcomes: dict[str, list[Outcome]] = {name: [] for name in own}
-    for done, draw in enumerate(draws, 1):
+    for draw in draws:
         for name, found in outcomes.items():
             found.append(attempt(evaluations[name], draw))
-        if progress is not None:
-            progress(done)
     intervals = {}
     for name, indices in own.items():
         drawn = outcomes[name]

@@ -3,6 +3,8 @@ from pathlib import Path
 
 import pytest
 
+from identification.progress import PROGRESS
+
 DEMO = Path(__file__).parents[2] / "examples" / "mariner" / "ship.toml"
 DRAWS = 24
 
@@ -21,6 +23,15 @@ def demo():
     return DEMO
 
 
+@pytest.fixture
+def told():
+    """What `PROGRESS` is told: stage, units done, total."""
+    calls = []
+    token = PROGRESS.set(lambda *now: calls.append(now))
+    yield calls
+    PROGRESS.reset(token)
+
+
 @pytest.fixture(scope="session")
 def chain(tmp_path_factory):
     """The whole chain on the demo's trials, once: the folder written, the result, the
@@ -29,9 +40,9 @@ def chain(tmp_path_factory):
 
     folder = tmp_path_factory.mktemp("chain") / "report"
     stages = []
-    result = build_autopilot(
-        DEMO, folder, draws=DRAWS, seed=1, progress=lambda *told: stages.append(told)
-    )
+    token = PROGRESS.set(lambda *told: stages.append(told))
+    result = build_autopilot(DEMO, folder, draws=DRAWS, seed=1)
+    PROGRESS.reset(token)
     return folder, result, stages
 
 

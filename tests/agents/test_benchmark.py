@@ -407,6 +407,7 @@ def test_the_command_ranks_and_writes(suite, tmp_path):
     answer = shipgym(*words)
     assert answer.exit_code == 0, answer.stderr
     assert answer.stdout.startswith("small-v1, steering: 2 episodes of each task")
+    assert "score" not in answer.stdout  # which needs all tasks
     assert "warning: 2 of 100 episodes: for a quick look" in answer.stderr
     assert (out / "index.html").exists()
     again = shipgym(*words, "--resume", "--json")
@@ -425,8 +426,9 @@ def test_the_command_goes_on_where_it_was_interrupted(suite, tmp_path, monkeypat
         patched.setattr(PID, "predict", interrupted)
         answer = shipgym(*words)
     assert answer.exit_code == 130
-    assert "what was done is kept in r: continue with --resume" in answer.stderr
-    assert shipgym(*words, "--resume").exit_code == 0
+    kept, _, again = answer.stderr.partition("; go on with: shipgym benchmark ")
+    assert kept == "error: interrupted; finished jobs kept in r: 1"
+    assert shipgym(*again.split()).exit_code == 0
     assert set(load_results("r").ranking) == {"lq", "pid"}
 
 
@@ -439,6 +441,7 @@ def test_bad_input_is_one_message_and_nothing_is_written(suite, tmp_path):
         (["--suite", "shipgym-v2"], "Did you mean 'shipgym-v1'"),
         (["--suite", tmp_path / "none.toml"], "there is no such TOML file of a suite"),
         (["--suite", suite, "--tasks", "calm,"], "task: expected one of"),
+        (["--suite", suite, "--resume"], "no results are there; leave --resume out"),
     ):
         answer = shipgym(*words, "--out", out)
         assert (answer.exit_code, answer.stdout) == (2, "")

@@ -197,6 +197,21 @@ def test_an_interruption_leaves_nothing_and_exits_with_130(demo, tmp_path, monke
     assert list(tmp_path.iterdir()) == []
 
 
+def test_an_interruption_after_the_identification_leaves_the_model(
+    demo, tmp_path, monkeypatch
+):
+    def interrupted(*_args, **_settings):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("agents.verification.chain.verify", interrupted)
+    words = ["autopilot", str(demo), "--out", str(tmp_path / "a report")]
+    answer = shipgym(*words)
+    assert answer.exit_code == 130
+    assert f"kept in {tmp_path}/a report" in answer.stderr
+    assert shlex.split(answer.stderr)[-5:] == ["shipgym", *words]
+    assert load_model(tmp_path / "a report" / "model.json").covariance is not None
+
+
 def test_trials_tells_indices_and_criteria():
     answer = shipgym("trials", "mariner", "--json")
     told = json.loads(answer.stdout)

@@ -118,37 +118,29 @@ def test_workers_give_the_same_and_import_nothing_from_the_working_folder(
         assert folder == str(tmp_path)
 
 
-def test_a_killed_worker_is_one_message_and_finished_jobs_are_kept(functions, tmp_path):
+def test_a_killed_worker_is_one_message_and_finished_jobs_are_kept(
+    functions, tmp_path, told
+):
     jobs = [{"k": k} for k in range(3)]
     engine = JobEngine(workers=2, keep=tmp_path / "kept")
     run_jobs(functions.dies, jobs[:1], engine)
     with pytest.raises(JobError, match=r"worker process was killed.*try fewer workers"):
         run_jobs(functions.dies, jobs, engine)
-    calls = []
-    run_jobs(
-        functions.dies,
-        [jobs[0], jobs[0]],
-        engine,
-        progress=lambda *call: calls.append(call),
-    )
-    assert calls == [(2, 2)]
+    told.clear()
+    run_jobs(functions.dies, [jobs[0], jobs[0]], engine)
+    assert told == [("jobs done", 2, 2)]
 
 
 def test_a_kept_result_is_not_computed_again_unless_its_file_is_broken(
-    functions, tmp_path
+    functions, tmp_path, told
 ):
     log, kept = tmp_path / "log", tmp_path / "kept"
     jobs = [{"k": k, "log": str(log), "wrong": -1} for k in range(4)]
     run_jobs(functions.logged, jobs[:3], JobEngine(keep=kept))
     min(kept.iterdir()).write_text('{"cut short')
-    calls = []
-    run_jobs(
-        functions.logged,
-        jobs,
-        JobEngine(keep=kept),
-        lambda *call: calls.append(call),
-    )
-    assert calls == [(2, 4), (3, 4), (4, 4)]
+    told.clear()
+    run_jobs(functions.logged, jobs, JobEngine(keep=kept))
+    assert told == [("jobs done", n, 4) for n in (2, 3, 4)]
     assert len(log.read_text().split()) == 5
     assert len(list(kept.iterdir())) == 4
 

@@ -1,6 +1,7 @@
 """What is printed where: messages, JSON, tables and progress."""
 
 from io import StringIO
+from time import sleep
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ from rich.text import Text
 
 from agents.cli import tables, terminal
 from identification import progress
+from shipgym.engine.compiling import tell_who_waits
 
 NOW = {"total": 20_000, "seconds": 12.4, "cost": 5.0, "best_cost": 4.5}
 NOW["yardsticks"] = {"zero action": 9.0, "LQ": 4.25}
@@ -23,7 +25,7 @@ def test_bars_are_shown_on_a_terminal_that_is_not_to_be_quiet(quiet, monkeypatch
     monkeypatch.setattr(terminal, "err", console)
     now = SimpleNamespace(steps=5000, evaluated=True, **NOW)
     with terminal.printing(as_json=False, quiet=quiet):
-        with terminal.identifying("identifying"):
+        with terminal.progress_bars("identifying"):
             list(progress.counted("[models] drawn", "abcd"))
         with terminal.training_bar() as tell:
             tell(now)
@@ -40,12 +42,15 @@ def test_bars_are_shown_on_a_terminal_that_is_not_to_be_quiet(quiet, monkeypatch
 
 
 def test_off_a_terminal_a_line_a_minute_is_printed(monkeypatch, capsys):
-    seconds = iter(range(0, 10_000, 40))
-    monkeypatch.setattr(terminal, "monotonic", lambda: next(seconds))
-    with terminal.progress_bars() as tell:
-        for done in range(4):
-            tell("models drawn", done, 4)
-    assert capsys.readouterr().err == "models drawn: 1 of 4\nmodels drawn: 3 of 4\n"
+    """It says what is done, and at once what is compiled."""
+    monkeypatch.setattr(terminal, "FIRST_LINE", 0.2)
+    with terminal.progress_bars("models drawn"):
+        progress.PROGRESS.get()("models drawn", 1, 4)
+        tell_who_waits("compiling a ship")
+        sleep(0.4)
+    tell_who_waits("compiling another")
+    told = "compiling a ship\nmodels drawn, 1 of 4, 0 s so far\n"
+    assert capsys.readouterr().err == told
 
 
 def test_a_piped_table_cuts_no_name(capsys):

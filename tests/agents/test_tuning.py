@@ -36,11 +36,12 @@ def diverges(plan, trial):
     raise InputError(f"not finite, gamma {plan.settings.gamma}")
 
 
-def test_better_settings_are_found_and_written_for_training(tmp_path, monkeypatch):
+def test_better_settings_are_found_and_written_for_training(
+    tmp_path, monkeypatch, told
+):
     monkeypatch.setattr(tuning, "lowest_cost", bowl)
-    told = []
-    found = tune(plan(), tmp_path, 12, on_progress=lambda *now: told.append(now))
-    assert told == [(k, 12) for k in range(1, 13)]
+    found = tune(plan(), tmp_path, 12)
+    assert told == [("trials", k, 12) for k in range(1, 13)]
     assert found.best_value < found.trials[0].value
     assert found.trials[0].params == {}
     assert {trial.state.name for trial in found.trials} == {"COMPLETE", "PRUNED"}
