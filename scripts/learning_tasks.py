@@ -25,7 +25,9 @@ from agents.training.controller_search import SearchBudget, search
 from agents.training.controller_space import factor
 from agents.training.residual import ResidualVecEnv
 from shipgym.arrays import Floats
+from shipgym.envs.registration import register_file
 from shipgym.envs.sb3 import ShipVecEnv
+from shipgym.examples import FOLDER
 
 JUDGED, SEARCHED = 1_000_000, 500_000  # first seeds
 EPISODES = 100
@@ -38,9 +40,57 @@ class PD(LearningRule):
 
     def steer(self, rows: Floats, state: Any, starts: Any) -> tuple[Floats, Any]:
         """No memory."""
-        k = self.numbers
-        error = k["error"] * np.arctan2(rows[:, 0], rows[:, 1])
-        return error - k["rate"] * rows[:, 2] + k["integral"] * rows[:, 7], state
+        k = self.known
+        error = k.error * np.arctan2(rows[:, 0], rows[:, 1])
+        return error - k.rate * rows[:, 2] + k.integral * rows[:, 7], state
+
+
+class Berth(LearningRule):
+    """PD on the line of the berth; the shaft holds the speed from which she stops."""
+
+    numbers: Mapping[str, float] = {
+        "error": 20.3,
+        "rate": 14.8,
+        "off": 7.3,
+        "sway": 2.6,
+        "base": 0.14,  # shaft
+        "way": 1.9,  # shaft by speed
+        "fast": 13.2,  # against speed above that
+        "margin": 0.064,
+    }
+
+    def steer(self, rows: Floats, state: Any, starts: Any) -> tuple[Floats, Any]:
+        """No memory."""
+        k = self.known
+        sine, cosine, yaw_rate, surge, sway, _, off, fast = rows.T
+        rudder = -k.error * np.arctan2(sine, cosine) - k.rate * yaw_rate
+        rudder -= k.off * off + k.sway * sway
+        shaft = k.base + k.way * surge - k.fast * (fast + k.margin)
+        return np.stack([rudder, shaft], axis=1), state
+
+
+class River(LearningRule):
+    """PD on the course of the river, with its bend; the shaft holds the limit."""
+
+    numbers: Mapping[str, float] = {
+        "error": 8.7,
+        "rate": 9.4,
+        "bend": 6.3,
+        "off": 3.0,
+        "base": 0.86,  # shaft by limit
+        "speed": 0.93,  # shaft by what is short of it
+        "stream": 0.01,  # above the limit, through the water
+    }
+
+    def steer(self, rows: Floats, state: Any, starts: Any) -> tuple[Floats, Any]:
+        """No memory."""
+        k = self.known
+        sine, cosine, bend, yaw_rate, _, surge, off, limit = rows.T
+        rudder = k.error * np.arctan2(sine, cosine) - k.rate * yaw_rate
+        rudder += k.bend * bend - k.off * off
+        limit = np.minimum(limit + k.stream, 1.0)
+        shaft = k.base * limit + k.speed * (limit - surge)
+        return np.stack([rudder, shaft], axis=1), state
 
 
 class Task(NamedTuple):
@@ -54,6 +104,8 @@ TASKS = {
     "rudder-roll": Task("shipgym/RudderRoll-v0", RollDamping),
     "encounter": Task("shipgym/Encounter-v0", Scenarios),
     "unknown-ship": Task("shipgym/UnknownShip-v0", PD),
+    "berth": Task("examples/Berth-v0", Berth),
+    "river": Task("examples/River-v0", River),
 }
 
 
@@ -78,6 +130,8 @@ def main() -> None:
     given = parser.parse_args()
     torch.set_num_threads(1)
     task = TASKS[given.task]
+    if task.env.startswith("examples/"):
+        register_file(task.env, FOLDER / f"{given.task}.py")
     ships = ships_of(task, EPISODES, JUDGED)
     rule = rule_of(task, ships)
     print("| | cost | beyond | success |\n| --- | ---: | ---: | ---: |")

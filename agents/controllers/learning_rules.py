@@ -31,18 +31,21 @@ class LearningRule:
         episode_start: Any = None,
         deterministic: bool = True,
     ) -> tuple[Any, Any]:
-        """Return the rudder for each ship, as `Policy.predict` does, and the memory."""
+        """Return the orders of each ship, as `Policy.predict` does, and the memory."""
         rows = np.atleast_2d(observation).astype(np.float32)  # twice as fast
         if state is None:
             starts = np.ones(len(rows), dtype=np.bool_)
         else:
             starts = np.reshape(episode_start, -1)
-        rudder, state = self.steer(rows, state, starts)
-        action = np.clip(rudder, -1.0, 1.0).reshape(*np.shape(observation)[:-1], 1)
+        orders, state = self.steer(rows, state, starts)
+        action = np.clip(orders, -1.0, 1.0).reshape(*np.shape(observation)[:-1], -1)
         return action.astype(np.float32), state
 
     def steer(self, rows: Any, state: Any, starts: Any) -> tuple[Any, Any]:
-        """Return rudder and memory of each ship; `starts`: where an episode begins."""
+        """Return orders and memory of each ship; `starts`: where an episode begins.
+
+        Orders have the shape (n,), or (n, 2) with a shaft.
+        """
         raise NotImplementedError
 
 
