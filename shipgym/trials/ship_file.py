@@ -83,34 +83,24 @@ def read_entries(
             f' with file = "run.csv", got {shown(tables)}'
         )
     columns = parse_columns(data.get("columns", {}), f"{path}: [columns]")
-    sensors = check_table(data.get("sensors", {}), f"{path}: [sensors]")
+    sensors = data.get("sensors", {})
+    installation = Installation.from_mapping(sensors, f"{path}: [sensors]")
     where = f"{path}: [conventions]"
     words = check_table(data.get("conventions", {}), where, _CONVENTIONS)
-    Conventions(**words, xg=ship.xg, where=where)
-    Installation.from_mapping(sensors, f"{path}: [sensors]")
+    usual = Conventions(**words, xg=ship.xg, where=where, installation=installation)
     entries: dict[tuple[str, str], TrialEntry] = {}
     for number, table in enumerate(tables, start=1):
         where = f"{path}: [[trials]] {number}"
         check_table(table, where, _KEYS)
-        place = f"{where} sensors"
-        own_sensors = table.get("sensors", {})
-        check_table(own_sensors, place)
         own_columns = parse_columns(table.get("columns", {}), f"{where} columns")
-        own_words = {key: table[key] for key in _CONVENTIONS if key in table}
-        entry = _read_entry(
-            table,
-            path.parent,
-            where,
-            {**columns, **own_columns},
-            Conventions(
-                **{**words, **own_words},
-                xg=ship.xg,
-                where=where,
-                installation=Installation.from_mapping(
-                    {**sensors, **own_sensors}, place
-                ),
-            ),
-        )
+        own = {key: table[key] for key in _CONVENTIONS if key in table}
+        if "sensors" in table:
+            place = f"{where} sensors"
+            every = {**sensors, **check_table(table["sensors"], place)}
+            own["installation"] = Installation.from_mapping(every, place)
+        conventions = replace(usual, **own, where=where)
+        known = {**columns, **own_columns}
+        entry = _read_entry(table, path.parent, where, known, conventions)
         part = os.path.normpath(entry.path), str(entry.cut)
         if part in entries:
             raise InputError(
