@@ -190,6 +190,10 @@ def test_a_steering_command_stands_for_the_rudder(tmp_path, names, edit):
         (b"#ROSBAG V2.0\n", "a bag of ROS 1; write its topic as CSV: rostopic echo"),
         (b"\x89MCAP0\r\n", "an MCAP file"),
         (b"\xa3\x95\x80\x80", "of ArduPilot or PX4; write its messages as CSV"),
+        (
+            b"INFO\n2021-05-03-09:59:50.1 2 35 255 127245 Rudder:  Position = 1.2 deg",
+            "text of canboat's analyzer; write JSON: analyzer -json",
+        ),
         (b"<?xml version='1.0'?><gpx>", "a track (GPX or KML) without rudder"),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "(.xls); save it as .xlsx"),
         (b"<!DOCTYPE html>", "a web page, a PDF or a ship file; name a log"),

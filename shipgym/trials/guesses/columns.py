@@ -1,7 +1,6 @@
 """Guesses of the column of a log that holds a channel, and of its unit."""
 
 import re
-from collections.abc import Collection, Iterable
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import cache, lru_cache
@@ -225,13 +224,10 @@ def _guess_speeds(table: LogTable, guesses: dict[str, ColumnGuess]) -> None:
     channels = ["sog", "stw", "u", "v"]
     if not guesses.keys().isdisjoint(("lat", "x")):
         channels = [] if "cog" in guesses else ["sog"]
-    unknown = {}
-    for channel in channels:
-        guess = guesses.get(channel)
-        if guess is not None and guess.reason.startswith(_FROM_SIZE):
-            unknown[channel] = table.likely_numbers(guess.name)
-    sizes = [np.nanmax(np.abs(one)) for one in unknown.values() if one is not None]
-    largest = max(sizes, default=0.0)
+    found = [guesses[channel] for channel in channels if channel in guesses]
+    unknown = [one for one in found if one.reason.startswith(_FROM_SIZE)]
+    columns = [np.array(table.likely_numbers(one.name), float) for one in unknown]
+    largest = max((np.nanmax(np.abs(column)) for column in columns), default=0.0)
     is_si = any(guess.unit in ("rad", "rad/s") for guess in guesses.values())
     fastest = 15.0 if is_si else 3.0  # that is likelier in m/s
     beside = ", with angles in rad" if is_si else ""
@@ -240,8 +236,8 @@ def _guess_speeds(table: LogTable, guesses: dict[str, ColumnGuess]) -> None:
         " km/h"
     )
     unit = "m/s" if largest <= fastest else "knots"
-    for channel in unknown:
-        guesses[channel] = replace(guesses[channel], unit=unit, reason=reason)
+    for one in unknown:
+        guesses[one.channel] = replace(one, unit=unit, reason=reason)
 
 
 def _quaternion(table: LogTable, free: list[str]) -> ColumnGuess | None:
@@ -279,13 +275,11 @@ def _first_match(
         if unit is not None and _may_be(table, column, channel):
             fitting.append(ColumnGuess(column, channel=channel, **unit._asdict()))
     fitting.sort(key=lambda one: one.unit == UNKNOWN)
-    only_with_unit = _column_names()["with_unit"]
-    of_unit = only_with_unit.get(channel, [])
+    of_unit = _column_names()["with_unit"].get(channel, [])
     for pattern in (*patterns, *of_unit):
         for guess in fitting:
             may_be = guess.is_named or pattern not in of_unit
-            forms = _forms(guess.name, channel)
-            if may_be and _matches(forms, [pattern]):
+            if may_be and _is_named(guess.name, channel, pattern):
                 return guess
     return None
 
@@ -336,10 +330,10 @@ def _unit_by_size(table: LogTable, column: str, channel: str) -> UnitGuess:
     values = table.likely_numbers(column)
     if values is not None and np.nanmax(np.abs(values), initial=0.0) < 6.3:
         for unit, patterns in _column_names()["units"].items():
-            if _matches([_plain(column.lower())], patterns):
-                named = named_unit([unit], channel, "of its recorder, by its name")
-                if named is not None:
-                    return named
+            plain = _plain(column.lower())
+            named = named_unit([unit], channel, "of its recorder, by its name")
+            if named and any(fnmatchcase(plain, pattern) for pattern in patterns):
+                return named
     if values is not None and channel != "t":
         values, _ = without_sentinels(channel, values, factor=1.0)
     return unit_by_size(values, channel)
@@ -386,9 +380,7 @@ def _with_date(table: LogTable, time: ColumnGuess, free: list[str]) -> ColumnGue
     for pattern in _column_names()["known"]["date"]:
         for column in free:
             date = table.first_text(column)
-            forms = _forms(column, "t")
-            is_named = _matches(forms, [pattern])
-            if is_named and _DATE.fullmatch(date):
+            if _is_named(column, "t", pattern) and _DATE.fullmatch(date):
                 free.remove(column)
                 return replace(time, date=column)
     return time
@@ -427,5 +419,5 @@ def _plain(name: str) -> str:
     return re.sub(r"[ ._()\[\]#%:/'\"-]", "", name)
 
 
-def _matches(forms: Iterable[str], patterns: Collection[str]) -> bool:
-    return any(fnmatchcase(form, one) for form in forms for one in patterns)
+def _is_named(column: str, channel: str, pattern: str) -> bool:
+    return any(fnmatchcase(form, pattern) for form in _forms(column, channel))

@@ -24,8 +24,7 @@ _MAGIC = {b"PAR1": "parquet", b"MATLAB 5.0": "matlab", b"MATLAB 7.3": "matlab"}
 #: of a file.
 _MESSAGES = re.compile(
     r"""^(?:[^\n]{0,200}[$!][A-Za-z0-9]{2}[A-Z]{3},
-    |[^\n]{0,80}\{[^\n]*"(?:updates|pgn)":
-    |[^\n]{0,30}\d{4}-\d\d-\d\d\S+\s+\d\s+\d+\s+\d+\s+\d{5,6}\s)""",
+    |[^\n]{0,80}\{[^\n]*"(?:updates|pgn)":)""",
     re.MULTILINE | re.VERBOSE,
 )
 
