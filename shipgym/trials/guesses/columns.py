@@ -379,8 +379,9 @@ def _with_date(table: LogTable, time: ColumnGuess, free: list[str]) -> ColumnGue
         return time
     for pattern in _column_names()["known"]["date"]:
         for column in free:
+            is_named = _is_named(column, "t", pattern)
             date = table.first_text(column)
-            if _is_named(column, "t", pattern) and _DATE.fullmatch(date):
+            if is_named and _DATE.fullmatch(date):
                 free.remove(column)
                 return replace(time, date=column)
     return time

@@ -221,10 +221,11 @@ def check_speed_units(log: Log, locator: Locator) -> None:
         is_own = unit == column.unit
         if is_usual or is_own or not unit:
             continue
+        declaration = locator.declaration(channel, unit)
         raise InputError(
             f"{locator.path}: expected column '{column.name}' to agree with the speed"
             f" over ground, got {ratio:.3g} times as much over ground, which no current"
-            f" does; likely a wrong unit, declare {locator.declaration(channel, unit)}",
+            f" does; likely a wrong unit, declare {declaration}",
             [(channel, unit)],
         )
 
