@@ -132,10 +132,19 @@ def test_times_before_the_lines_are_a_clock(stamp, kinds, tmp_path):
     assert_as_sailed(read(tmp_path, stamped(STAMPS[stamp], *kinds), "log.txt"))
 
 
-def test_a_recorder_in_another_zone_takes_the_time_of_the_satellites(tmp_path):
+def test_a_recorder_in_another_zone_keeps_its_clock(tmp_path):
     trial = read(tmp_path, stamped(half_past, rmc, hdt, rsa))
     assert_as_sailed(trial)
-    assert_said(trial, "7200.5 s ahead of those of GPRMC")
+    assert_said(trial, "time from stamps of the lines")
+
+
+def test_a_recorder_that_writes_in_blocks_takes_the_time_of_the_satellites(tmp_path):
+    def late(one, _):
+        return clock(one.t // 9 * 9 + 9 * (one.t % 31 > 15), "%Y-%m-%d %H:%M:%S ")
+
+    trial = read(tmp_path, stamped(late, rmc, hdt, rsa))
+    assert_as_sailed(trial)
+    assert_said(trial, "before the lines do not run with those of GPRMC: left out")
 
 
 @pytest.mark.parametrize(("name", "end"), [("log.txt", "\n"), ("a.csv", "\r")])

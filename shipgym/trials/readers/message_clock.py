@@ -18,7 +18,7 @@ from shipgym.trials.clock_texts import (
     spread_evenly,
     unit_since_1970,
 )
-from shipgym.trials.readers.messages import BySource, Heard, Value
+from shipgym.trials.readers.messages import Heard
 from shipgym.trials.units import UNITS
 
 
@@ -35,41 +35,44 @@ class Clock(NamedTuple):
 def log_clock(path: Path, heard: Heard, notes: list[str]) -> Clock | None:
     """The clock of a log; None where nothing in it tells the time.
 
-    Stamps of lines are preferred, as they are there for every message; by the times of
-    satellites they are put right. Raises InputError for a clock that was set back.
+    Stamps of lines are preferred, as they are there for every message, unless they do
+    not run with the times of satellites. Raises InputError for a clock that was set
+    back.
     """
-    own = _own_clock(path, heard.times)
+    own = _own_clock(path, heard)
     clock = _stamp_clock(heard) or own
     if clock is None:
         return None
     if own is not None and clock is not own:
-        ahead = _ahead(clock, heard.times[own.source])
-        least, middle, most = np.quantile(ahead, [0.1, 0.5, 0.9]).tolist()
-        words = ""
-        if most - least > 2.0:
-            words = f"do not run with those of {own.source}: left out"
-            clock = own
-        elif abs(middle) > 1.0:  # a message takes part of a second
-            words = (
-                f"are {middle:.6g} s ahead of those of {own.source}, which are taken"
+        ahead = np.interp(own.lines, clock.lines, clock.t) - own.t
+        least, most = np.quantile(ahead, [0.1, 0.9])
+        if most - least > 2.0:  # a message takes part of a second
+            notes.append(
+                f"the times before the lines do not run with those of {own.source}:"
+                " left out"
             )
-            clock = clock._replace(t=clock.t - middle)
-        if words:
-            notes.append(f"the times before the lines {words}")
+            clock = own
     return _with_bursts(clock, sorted(heard.order))
 
 
-def _own_clock(path: Path, times: BySource) -> Clock | None:
-    """Times of the source that gives a date, of those the busiest one."""
+def _own_clock(path: Path, heard: Heard) -> Clock | None:
+    """Times of a busy source that gives positions, which they then have exactly."""
+    times = {
+        source: np.array([one.time for one in values])
+        for source, values in heard.times.items()
+    }
     if not times:
         return None
+    most = max(np.unique(t).size for t in times.values())
 
-    def rank(source: str) -> tuple[bool, int]:
-        moments = {one.time for one in times[source]}
-        return is_dated(min(moments)), len(moments)
+    def rank(source: str) -> tuple[bool, bool, bool, int]:
+        size = np.unique(times[source]).size
+        gives_places = source in heard.channels.get("lat", {})
+        return 2 * size >= most, gives_places, is_dated(times[source].min()), size
 
     best = max(sorted(times), key=rank)
-    lines, t, _ = np.array(times[best]).T
+    t = times[best]
+    lines = np.array([one.line for one in heard.times[best]], dtype=np.float64)
     if not is_dated(t[0]):
         t = np.unwrap(t, period=DAY)
     goes_back = np.diff(t) < -5.0
@@ -125,41 +128,8 @@ def _increasing(t: Floats, lines: Floats, source: str) -> Clock:
     return Clock(t, lines[first], source)
 
 
-def _ahead(stamps: Clock, values: list[Value]) -> Floats:
-    """Seconds that stamps are ahead of times that messages give, day or no day."""
-    lines, t, _ = np.array(values).T
-    after = np.searchsorted(stamps.lines, lines, side="right")
-    at = np.maximum(after - 1, 0)
-    ahead: Floats = stamps.t[at] - t
-    if not is_dated(t[0]):  # stamps of the day take the day of the messages
-        ahead = np.unwrap(ahead, period=DAY)
-        days = np.median(ahead) / DAY
-        ahead -= DAY * np.round(days)
-    return ahead
-
-
-def times_of(values: list[Value], clock: Clock) -> Floats:
-    """Time of each value, s: its own, else that of the clock at its line."""
-    lines, own, _ = np.array(values).T
-    by_line = _spread(lines, clock)
-    is_known = np.isfinite(own)
-    if not is_known.any():
-        return by_line
-
-    # a time of the day is that of the day on which its line stands
-    t = own + DAY * np.round((by_line - own) / DAY)
-    known = t[is_known]
-    of_known = lines[is_known]
-    distinct = np.unique(known).size
-    if distinct < 0.6 * known.size:  # whole seconds of a faster source
-        own_clock = _increasing(known, of_known, clock.source)
-        own_clock = own_clock._replace(in_bursts=True)
-        t[is_known] = _spread(of_known, own_clock)
-    return np.where(is_known, t, by_line)
-
-
-def _spread(lines: Floats, clock: Clock) -> Floats:
-    """Times of lines between those with a time.
+def times_of(lines: Floats, clock: Clock) -> Floats:
+    """Times of lines, s, by those with a time.
 
     Where the same messages come at every moment, they are of that moment; of a source
     that speaks several times the first one is, and the others follow evenly. In other

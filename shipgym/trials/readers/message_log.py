@@ -13,7 +13,6 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import placed
 from shipgym.errors import InputError
-from shipgym.trials.clock_texts import is_dated
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.readers.message_clock import Clock, log_clock, times_of
 from shipgym.trials.readers.messages import Heard, Value
@@ -24,9 +23,9 @@ from shipgym.trials.readers.text_files import text_lines
 from shipgym.trials.resampling import FEWEST_SAMPLES
 from shipgym.trials.units import DEGREE
 
-#: Preferred kinds of sentences: true headings, and of speeds through the water the log
-#: with two axes.
-_PREFERENCE = {"HDT": 3, "THS": 2, "VHW": 1, "VBW": 2}
+#: Preferred kinds of sentences: true headings, of speeds through the water the log with
+#: two axes, and of positions what has their date.
+_PREFERENCE = {"HDT": 3, "THS": 2, "VHW": 1, "VBW": 2, "RMC": 1}
 
 
 class Track(NamedTuple):
@@ -36,7 +35,6 @@ class Track(NamedTuple):
     lines: Floats
     values: Floats
     source: str
-    has_dates: bool = False
 
     @property
     def words(self) -> str:
@@ -91,11 +89,20 @@ def _choose_tracks(
 
 
 def _track(source: str, values: list[Value], clock: Clock) -> Track:
-    """Values of a source at their own times, else at those of their lines."""
-    lines, times, numbers = np.array(values).T
+    """Values of a source at the times of their lines.
+
+    Those of a time that it said before are left out, unless it says each several times.
+    """
+    lines, own, numbers = np.array(values).T
+    _, firsts = np.unique(own, return_index=True)
+    kept = np.sort(firsts)
+    if kept.size < 0.6 * own.size:
+        kept = np.arange(own.size)
     # to a tenth of a millisecond
-    t, first = np.unique(np.round(times_of(values, clock), 4), return_index=True)
-    return Track(t, lines[first], numbers[first], source, is_dated(times[0]))
+    times = np.round(times_of(lines[kept], clock), 4)
+    t, first = np.unique(times, return_index=True)
+    kept = kept[first]
+    return Track(t, lines[kept], numbers[kept], source)
 
 
 def _best(channel: str, tracks: Sequence[Track]) -> Track:
@@ -108,7 +115,6 @@ def _best(channel: str, tracks: Sequence[Track]) -> Track:
             track.covered >= 0.5 * most,
             channel != "delta" or np.ptp(track.values) > 0.5 * DEGREE,
             _PREFERENCE.get(track.source[2:5], 0),
-            track.has_dates,
             not track.source.startswith("II"),
             track.t.size,
             not track.source.endswith(" port"),
