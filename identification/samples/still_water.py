@@ -295,7 +295,7 @@ def _estimated_currents(
     return found
 
 
-def _contradict(currents: Floats, covariance: Floats, chance: float = 1e-6) -> bool:
+def _contradict(currents: Floats, covariance: Floats) -> bool:
     """Return whether the currents of trials differ by more than chance.
 
     The chance is small because their covariance is an average over few blocks.
@@ -303,7 +303,7 @@ def _contradict(currents: Floats, covariance: Floats, chance: float = 1e-6) -> b
     n_others = len(currents) // 2 - 1
     from_first = np.hstack([-np.ones((n_others, 1)), np.eye(n_others)])
     apart = np.kron(from_first, np.eye(2))
-    return wald_probability(apart @ currents, apart @ covariance @ apart.T) < chance
+    return wald_probability(apart @ currents, apart @ covariance @ apart.T) < 1e-6
 
 
 def wald_probability(mean: Floats, covariance: Floats) -> float:

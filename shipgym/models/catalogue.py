@@ -28,16 +28,14 @@ if TYPE_CHECKING:  # imported with the ships that need them
 LIBRARY = Path(__file__).parent / "library"
 
 
-def model_of(
-    ship: ShipEquations, coefficients: Mapping[str, float] | None = None
-) -> ShipModel:
-    """Make a model of a ship with its own equations, coefficients changed as given."""
+def model_of(ship: ShipEquations) -> ShipModel:
+    """Make a model of a ship with its own equations."""
     return ShipModel(
         name=ship.name,
         structure=ship.name,
         particulars=ship.particulars,
         steering=ship.steering,
-        coefficients={**ship.coefficients, **(coefficients or {})},
+        coefficients=ship.coefficients,
         provenance={"source": ship.source},
         dynamics=ship,
         service_shaft_speed=ship.service_shaft_speed,

@@ -45,12 +45,7 @@ def _derive_turning(log: Log) -> None:
     if log.has("psi") and not log.has("r"):
         log.derive("r", time_derivative(log.t, log.channels["psi"]))
     elif log.has("r") and not log.has("psi") and not log.has("x"):
-        from scipy.interpolate import make_interp_spline
-
-        degree = min(3, log.t.size - 1)
-        rate = make_interp_spline(log.t, log.channels["r"], k=degree)
-        heading = rate.antiderivative()(log.t)
-        log.derive("psi", heading - heading[0])
+        log.derive("psi", log.heading)
 
 
 def _earth_to_body(log: Log) -> None:

@@ -223,8 +223,9 @@ SHIP = ShipEquations(
 def bulk_carrier() -> ShipModel:
     """The larger ship, by the same equations."""
     return replace(
-        model_of(SHIP, BULK),
+        model_of(SHIP),
         name="bulk-carrier",
+        coefficients={**SHIP.coefficients, **BULK},
         particulars=BULK_CARRIER,
         service_shaft_speed=1.1,
         steering=SteeringGear(rudder_rate_deg_s=2.34, time_constant=1.0),
