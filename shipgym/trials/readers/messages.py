@@ -2,7 +2,6 @@
 
 import re
 from collections import defaultdict
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -54,11 +53,6 @@ class Value(NamedTuple):
     value: float
 
 
-def port_source(source: str) -> str:
-    """Name of the port one of two rudders that a source shows."""
-    return f"{source} port"
-
-
 BySource = dict[str, list[Value]]  # by sender and kind, such as HEHDT
 
 
@@ -103,10 +97,22 @@ class Heard:
         self,
         line: int,
         source: str,
-        values: Mapping[str, float],
+        values: dict[str, float],
         time: float = np.nan,
     ) -> None:
-        """Add what a source said in a line, with the time that it gave, if any."""
+        """Add what a source said in a line, with the time that it gave, if any.
+
+        A heading by compass gets its deviation, and is true if the variation is known.
+        The port one of two rudders is a source of its own.
+        """
+        if "port" in values:
+            self.hear(line, f"{source} port", {"delta": values.pop("port")}, time)
+        deviation = values.pop("deviation", 0.0)
+        if "psi_magnetic" in values:
+            values["psi_magnetic"] += deviation
+            if "variation" in values:
+                magnetic = values.pop("psi_magnetic")
+                values.setdefault("psi", magnetic + values["variation"])
         self.count += 1
         self.order.append((line, source))
         if np.isfinite(time):

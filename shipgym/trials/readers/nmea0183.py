@@ -14,7 +14,7 @@ from typing import NamedTuple
 from pynmea2 import NMEASentence
 
 from shipgym.files import shipped_toml
-from shipgym.trials.readers.messages import Heard, port_source
+from shipgym.trials.readers.messages import Heard
 from shipgym.trials.units import DEGREE, UNITS
 
 _FACTORS = {**UNITS["angle"], **UNITS["angular rate"], **UNITS["speed"]}
@@ -107,13 +107,10 @@ def hear_sentences(lines: Sequence[str], heard: Heard) -> None:
         except ValueError:
             heard.damage(one.line)
             continue
-        port = numbers.pop("port", None)
-        heard.hear(one.line, one.source, numbers, time)
-        if port is not None:
-            heard.hear(one.line, port_source(one.source), {"delta": port}, time)
         lacking += not one.checksum
-        if (numbers or port is not None) and _lacks_status(kind, fields):
+        if numbers and _lacks_status(kind, fields):
             without_status.append(one.source)
+        heard.hear(one.line, one.source, numbers, time)
     if lacking:
         heard.notes.append(
             f"{lacking} of {len(found)} sentences have no checksum: nothing protects"
@@ -159,13 +156,6 @@ def _numbers(kind: str, fields: Sequence[str]) -> dict[str, float]:
         is_there = fields[place.at] != ""
         if is_there and place.counts(fields):
             numbers[channel] = _number(fields, place)
-    # a heading by compass with its deviation, and true if the variation is known
-    deviation = numbers.pop("deviation", 0.0)
-    if "psi_magnetic" in numbers:
-        numbers["psi_magnetic"] += deviation
-        if "variation" in numbers:
-            magnetic = numbers.pop("psi_magnetic")
-            numbers.setdefault("psi", magnetic + numbers["variation"])
     return numbers
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from shipgym.extras import library
 from shipgym.files import shipped_toml
-from shipgym.trials.readers.messages import RAW_FRAME, Heard, port_source
+from shipgym.trials.readers.messages import RAW_FRAME, Heard
 from shipgym.trials.units import DEGREE
 
 _PGNS: dict[str, dict[str, str]] = shipped_toml("shipgym.trials", "nmea2000.toml")
@@ -66,9 +66,6 @@ def hear_pgns(lines: Sequence[str], heard: Heard) -> None:
         )
     for number, message in messages.items():
         source = f"PGN {message.pgn} of {message.sender}"
-        is_second = _number(message.fields.get("instance")) == 1.0
-        if is_second and message.pgn == "127245":
-            source = port_source(source)
         own_factor = 1.0 if message.is_si else factor
         heard.hear(number, source, _channels(message, own_factor))
 
@@ -134,10 +131,9 @@ def _channels(message: _Message, factor: float) -> dict[str, float]:
         number = _number(fields.get(name))
         if number is not None:
             values[channel] = number * (1.0 if channel in _NO_ANGLES else factor)
-    deviation = values.pop("deviation", 0.0)
+    if "delta" in values and _number(fields.get("instance")) == 1.0:
+        values["port"] = values.pop("delta")
     if "heading" in values:
-        heading = values.pop("heading")
         is_true = fields.get("reference") == "True"
-        name = "psi" if is_true else "psi_magnetic"
-        values[name] = heading if is_true else heading + deviation
+        values["psi" if is_true else "psi_magnetic"] = values.pop("heading")
     return values
