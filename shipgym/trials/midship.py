@@ -35,9 +35,7 @@ def to_project_conventions(log: Log, conventions: Conventions) -> None:
         _earth_to_body(log)
     if conventions.origin == "cg":
         _cg_to_midship(log, conventions.xg or 0.0)
-    needs_moving = not installation.is_at_midship or log.has("ground_north")
-    if needs_moving or log.has("stw") or not log.has("u", "v"):
-        _to_midship(log, installation)
+    _to_midship(log, installation)
 
 
 def _derive_turning(log: Log) -> None:
@@ -86,15 +84,11 @@ def _to_midship(
     for GNSS without a heading.
     """
     channels = log.channels
-    is_elsewhere = not installation.is_at_midship
-    lacks_heading = not log.has("psi")
-    is_track_alone = lacks_heading and log.has("x") and not log.has("delta")
-    if is_track_alone and not is_elsewhere:
-        channels.pop("ground_north", None)
-        channels.pop("ground_east", None)
-    elif lacks_heading and (is_elsewhere or log.has("ground_north")):
+    is_moved = log.has("x", "y") and not installation.is_at_midship
+    is_track_alone = log.has("x") and not log.has("delta")
+    if is_moved or (log.has("ground_north") and not is_track_alone):
         log.needed("psi", "positions or velocities of GNSS")
-    if is_elsewhere and log.has("x", "y"):
+    if is_moved:
         north, east = rotate_to_body(
             installation.forward,
             installation.starboard,
@@ -123,17 +117,15 @@ def _velocity(log: Log, installation: Installation) -> tuple[Floats, Floats] | N
 
     None without a heading, and where both were logged.
     """
-    channels = log.channels
-    if log.has("ground_north"):
-        north, east = channels.pop("ground_north"), channels.pop("ground_east")
-        u, v = rotate_to_body(north, east, channels["psi"])
-        # of the antenna, which the yaw rate moves too
-        r = channels["r"]
-        return u + installation.starboard * r, v - installation.forward * r
-    if log.has("u", "v") or not log.has("x", "y", "psi"):
+    is_logged = log.has("ground_north", "psi")
+    if not is_logged and (log.has("u", "v") or not log.has("x", "y", "psi")):
         return None
-    north, east = (time_derivative(log.t, channels[name]) for name in "xy")
-    return rotate_to_body(north, east, channels["psi"])
+    u, v = rotate_to_body(*log.ground_velocity, log.channels["psi"])
+    if is_logged:  # of the antenna, which the yaw rate moves too
+        r = log.channels["r"]
+        u = u + installation.starboard * r
+        v = v - installation.forward * r
+    return u, v
 
 
 def _sway_through_water(log: Log, water: Floats, u: Floats, v: Floats) -> Floats:

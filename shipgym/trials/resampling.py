@@ -11,6 +11,7 @@ import numpy.typing as npt
 from shipgym.arrays import Flags, Floats, integral
 from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
+from shipgym.trials.derivatives import time_derivative
 
 #: Fewest samples of a trial, and of a channel.
 FEWEST_SAMPLES = 3
@@ -77,6 +78,15 @@ class Log:
         """Heading, or that which follows from the yaw rate; without jumps, rad."""
         psi = self.channels.get("psi")
         return integral(self.t, self.channels["r"]) if psi is None else psi
+
+    @property
+    def ground_velocity(self) -> tuple[Floats, Floats]:
+        """Velocity north and east over ground, m/s, as logged or by positions."""
+        channels = self.channels
+        if "ground_north" in channels:
+            return channels["ground_north"], channels["ground_east"]
+        north, east = (time_derivative(self.t, channels[name]) for name in "xy")
+        return north, east
 
     def derive(self, channel: str, values: Floats) -> None:
         """Add a channel that follows from others."""

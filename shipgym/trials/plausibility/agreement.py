@@ -12,7 +12,6 @@ from shipgym.arrays import Floats, integral
 from shipgym.errors import InputError
 from shipgym.trials.columns import ColumnGuess, Locator
 from shipgym.trials.conventions import Conventions
-from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.resampling import Log, changes, usual_step
 from shipgym.trials.units import DEGREE, fitting_units
 
@@ -157,22 +156,13 @@ def _check_size(
 _SLOWEST = 0.3  # m/s over ground, of any manoeuvre
 
 
-def _velocity_over_ground(log: Log) -> npt.NDArray[np.complex128]:
-    """North + i east velocity, m/s, by speed and course over ground or positions."""
-    channels = log.channels
-    if "ground_north" in channels:
-        return channels["ground_north"] + 1j * channels["ground_east"]
-    north, east = (time_derivative(log.t, channels[name]) for name in "xy")
-    return north + 1j * east
-
-
 def check_over_ground(log: Log, conventions: Conventions, locator: Locator) -> None:
     """Refuse a ship at berth, and a heading that contradicts the course over ground.
 
     The channels are as logged, in SI units, the heading without jumps.
     """
-    velocity = _velocity_over_ground(log)
-    speed = np.abs(velocity)
+    north, east = log.ground_velocity
+    speed = np.hypot(north, east)
     fastest = np.quantile(speed, 0.95)
     if fastest < _SLOWEST:
         raise InputError(
@@ -185,7 +175,7 @@ def check_over_ground(log: Log, conventions: Conventions, locator: Locator) -> N
         return
     is_known = bool(conventions.installation.heading_offset)
     psi = log.channels["psi"][moving]
-    course = np.angle(velocity[moving])
+    course = np.arctan2(east, north)[moving]
     apart = np.exp(1j * (course - psi))
     agreement = abs(apart.mean())
     both = np.exp(1j * (course + psi))
@@ -244,8 +234,7 @@ def _speeds(log: Log) -> dict[str, float]:
 def _usual_speed(log: Log) -> float:
     """Median speed over ground, m/s, by positions some seconds apart if there are."""
     if not log.has("x"):
-        speeds = np.abs(_velocity_over_ground(log))
-        return float(np.median(speeds))
+        return float(np.median(np.hypot(*log.ground_velocity)))
     passed, north, east = changes(log.t, 5.0, log.channels["x"], log.channels["y"])
     speeds = np.hypot(north, east) / passed
     return float(np.median(speeds))
