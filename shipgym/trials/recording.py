@@ -180,28 +180,27 @@ def _local_track(
             " missing"
         )
     check_ranges({"lat": lat, "lon": lon}, locator)
-    north = np.full_like(t, np.nan)
-    east = np.full_like(t, np.nan)
-    rows = np.flatnonzero(np.isfinite(lat + lon + t))
+    is_known = np.isfinite(lat + lon + t)
+    rows = np.flatnonzero(is_known)
     if not rows.size:
-        return north, east, 0
+        return np.full_like(t, np.nan), np.full_like(t, np.nan), 0
 
-    lat, lon = lat[rows], lon[rows]
+    north, east = local_metres(lat, lon, origin=(lat[rows[0]], lon[rows[0]]))
     here = replace(locator, rows=rows)
-    x, y = local_metres(lat, lon, origin=(lat[0], lon[0]))
-    is_far = find_outliers(t[rows], x, y, here)
-    if repair is None and is_far.any():
-        k = int(np.argmax(is_far))
+    outliers = rows[find_outliers(t[rows], north[rows], east[rows], here)]
+    if repair is None and outliers.size:
+        first = outliers[0]
         raise InputError(
-            f"{here.place(k, 'lat')}: expected a position that a ship reaches from"
-            f" those before and after, got {lat[k]:.5f}, {lon[k]:.5f}, one of"
-            f" {np.count_nonzero(is_far)} outliers among {lat.size}; empty its cells,"
-            ' or leave such rows to be filled with repair = "interpolate"',
+            f"{locator.place(first, 'lat')}: expected a position that a ship reaches"
+            f" from those before and after, got {lat[first]:.5f}, {lon[first]:.5f}, one"
+            f" of {outliers.size} outliers among {rows.size}; empty its cells, or leave"
+            ' such rows to be filled with repair = "interpolate"',
             [REPAIR],
         )
-    north[rows[~is_far]] = x[~is_far]
-    east[rows[~is_far]] = y[~is_far]
-    return north, east, int(is_far.sum())
+    is_known[outliers] = False
+    north[~is_known] = np.nan
+    east[~is_known] = np.nan
+    return north, east, outliers.size
 
 
 def _make_velocity(signals: Signals) -> None:

@@ -12,14 +12,18 @@ from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.readers.matlab import read_matlab
 from shipgym.trials.readers.messages import RAW_FRAME
 
-_READERS: dict[str, Callable[[Path, bytes], LogTable]] = {
-    "csv": read_csv,
-    "excel": read_excel,
-    "matlab": read_matlab,
-    "parquet": read_parquet,
+Reader = Callable[[Path, bytes], LogTable]
+
+_BY_ENDING: dict[str, Reader] = {
+    ".xlsx": read_excel,
+    ".mat": read_matlab,
+    ".parquet": read_parquet,
 }
-_ENDINGS = {".xlsx": "excel", ".mat": "matlab", ".parquet": "parquet"}
-_MAGIC = {b"PAR1": "parquet", b"MATLAB 5.0": "matlab", b"MATLAB 7.3": "matlab"}
+_BY_MAGIC: dict[bytes, Reader] = {
+    b"PAR1": read_parquet,
+    b"MATLAB 5.0": read_matlab,
+    b"MATLAB 7.3": read_matlab,
+}
 #: Sentences of NMEA 0183, deltas of Signal K and messages of NMEA 2000 at the beginning
 #: of a file.
 _MESSAGES = re.compile(
@@ -29,24 +33,26 @@ _MESSAGES = re.compile(
 )
 
 
-def recognise_kind(path: Path, content: bytes) -> str:
-    """Kind of a log; a text is "csv" unless it begins as "messages" or otherwise.
+def _reader(path: Path, content: bytes) -> Reader:
+    """Reader of a log; a text is a table unless it begins with messages.
 
     Raises InputError for a known kind of file that is no log.
     """
     ending = path.suffix.lower()
-    if ending in _ENDINGS:
-        return _ENDINGS[ending]
-    for magic, kind in _MAGIC.items():
+    if ending in _BY_ENDING:
+        return _BY_ENDING[ending]
+    for magic, reader in _BY_MAGIC.items():
         if content.startswith(magic):
-            return kind
+            return reader
     beginning = content[:4096].decode("latin-1").replace("\r", "\n")
     sentences = _MESSAGES.findall(beginning)
     frames = RAW_FRAME.findall(beginning)
     if len(sentences) + len(frames) >= 2:
-        return "messages"
+        from shipgym.trials.readers.message_log import read_messages  # with its tables
+
+        return read_messages
     _refuse_foreign(path, content)
-    return "csv"
+    return read_csv
 
 
 def _refuse_foreign(path: Path, content: bytes) -> None:
@@ -74,9 +80,5 @@ def read_log(path: str | Path | LogTable) -> LogTable:
     path = Path(path)
     with expecting("log", path):
         content = read_bytes(path, "log", LARGEST_CSV)
-        kind = recognise_kind(path, content)
-    if kind == "messages":
-        from shipgym.trials.readers.message_log import read_messages  # with its tables
-
-        return read_messages(path, content)
-    return _READERS[kind](path, content)
+        read = _reader(path, content)
+    return read(path, content)

@@ -174,10 +174,6 @@ class LogTable:
 
     def _without_time(self, name: str) -> list[int]:
         """Rows whose time is missing, or has no digit."""
-        plain = self.plain_numbers(name)
-        if plain is not None:
-            is_missing = np.isnan(plain)
-            return np.flatnonzero(is_missing).tolist()
         texts = enumerate(self.texts(name))
         return [row for row, text in texts if not any(map(str.isdigit, text))]
 
