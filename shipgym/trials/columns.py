@@ -166,9 +166,9 @@ def _parse_column(channel: str, entry: Any, where: str) -> Column:
                 f' of w in column, such as ["q[1]", "q[2]", "q[3]"], got {value!r}'
             )
     is_command = not fields.keys().isdisjoint(("neutral", "full", "minus"))
-    if is_command:
-        fields.setdefault("unit", "deg")
-    if is_command and (fields["unit"] != "deg" or not fields.get("full")):
+    if is_command and (
+        fields.setdefault("unit", "deg") != "deg" or not fields.get("full")
+    ):
         raise InputError(
             f"{where}: expected full, the change of the command that counts as 35 deg"
             " of rudder, not zero, and no unit, with neutral or minus; give full, such"
