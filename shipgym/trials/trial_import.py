@@ -110,9 +110,10 @@ def _check_channels(log: Log, conventions: Conventions) -> list[str]:
     remarks = lacking(log.channels)
     remarks += frozen_heading(log)
     remarks += check_steps(log.t, locator)
-    if "lat" in locator.columns or log.has("ground_north"):
+    has_velocity = log.has("ground_north")
+    if "lat" in locator.columns or has_velocity:
         check_over_ground(log, conventions, locator)
-    tells_speed = log.has("x", "y") or log.has("ground_north")
+    tells_speed = log.has("x", "y") or has_velocity
     tells_turning = log.has("psi") or log.has("r")
     if tells_speed:
         check_speed_units(log, locator)

@@ -71,7 +71,8 @@ def named_unit(
     units: list[str], channel: str, reason: str = "from its name"
 ) -> UnitGuess | None:
     """Unit of a channel among those with which a name ends; None if there is none."""
-    of_channel = UNITS[QUANTITIES[channel]]
+    quantity = QUANTITIES[channel]
+    of_channel = UNITS[quantity]
     fitting = (UnitGuess(unit, reason) for unit in units if unit in of_channel)
     return next(fitting, None)
 
