@@ -40,7 +40,7 @@ def export_command(
 ) -> None:
     """Write an autopilot or a ship model as C99 or FMU, a learned policy as ONNX."""
     from agents.agent_file import load_agent
-    from agents.cli.terminal import answer, say, warn
+    from agents.cli.terminal import answer, say
     from agents.export.fmu import check_fmu_name, write_fmu
     from agents.output import check_file, check_folder, whole_folder
     from agents.policies.onnx_export import onnx_model
@@ -58,8 +58,6 @@ def export_command(
         )
     graph = onnx_model(load_agent(what)) if onnx is not None else None
     source = _source(what, name, depth) if has_source else None
-    for note in source.notes if source else ():
-        warn(note)
     # all are checked before the first is written
     if fmu is not None:
         check_fmu_name(fmu)

@@ -19,14 +19,10 @@ from agents.export.source import (
     variables_of,
 )
 from agents.export.translator import Translator
-from shipgym import InputError, ShipModel, Weather, Wind
-from shipgym.arrays import Floats
-from shipgym.engine.mathematics import sin_cos
+from shipgym import ShipModel
 from shipgym.engine.motion import Motion, Push, Ship, lost, sail
-from shipgym.engine.records import Record, field_types, flat, leaves
+from shipgym.engine.records import Record, field_types
 from shipgym.models.simulate import LONGEST_STEP
-from shipgym.sea.open_sea import OPEN_SEA, Sea, SeaParameters, push
-from shipgym.sea.weather_column import CALM, weather_column
 from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.term_functions import speed_power
 
@@ -38,8 +34,6 @@ class ShipInput(NamedTuple):
     shaft: float  # 1/s, ordered shaft speed
     current_north: float  # m/s, current
     current_east: float  # m/s, current
-    wind_speed: float  # m/s, 10 m above the sea; 0: no wind forces
-    wind_from: float  # rad, direction the wind comes from
 
 
 SHIP_INPUTS = variables_of(ShipInput)
@@ -51,42 +45,12 @@ class Parameters(NamedTuple):
 
     ship: Ship
     coefficients: Any
-    sea: SeaParameters
 
 
-def advance(
-    motion: Motion, given: ShipInput, h: float, c: Any, ship: Ship, p: SeaParameters
-) -> Motion:
-    """State after a step in a steady current and wind, as `simulate` sails it."""
-    north = given.current_north
-    east = given.current_east
-    pushed = Push(u=0.0, v=0.0, r=0.0, p=0.0, north=north, east=east)
-    if given.wind_speed > 0.0:
-        pushed = push(motion, steady_sea(given), p)
-    return sail(motion, given.rudder, given.shaft, h, pushed, c, ship)
-
-
-def steady_sea(given: ShipInput) -> Sea:
-    """Sea of a steady current and wind, without waves or gusts."""
-    sine, cosine = sin_cos(given.wind_from)
-    return Sea(
-        mean_north=0.0,
-        mean_east=0.0,
-        wind_north=cosine,
-        wind_east=sine,
-        waves_north=1.0,
-        waves_east=0.0,
-        current_north=given.current_north,
-        current_east=given.current_east,
-        gust=given.wind_speed,
-        drift=0.0,
-        heading_displacement=0.0,
-        heading_velocity=0.0,
-        roll_displacement=0.0,
-        roll_velocity=0.0,
-        psi_wave=0.0,
-        r_wave=0.0,
-    )
+def advance(motion: Motion, given: ShipInput, h: float, c: Any, ship: Ship) -> Motion:
+    """State after a step in a steady current, as `simulate` sails it."""
+    current = Push(0.0, 0.0, 0.0, 0.0, given.current_north, given.current_east)
+    return sail(motion, given.rudder, given.shaft, h, current, c, ship)
 
 
 def ship_source(
@@ -96,27 +60,22 @@ def ship_source(
 ) -> Source:
     """Write a ship model as C99, by default under the model's name.
 
-    `water_depth`: m. A ship with too few particulars for wind forces is written without
-    them, as `Source.notes` says. Raises InputError for a name that C does not take,
-    shallow water that the model does not know, and equations of one's own that use more
-    than arithmetic.
+    `water_depth`: m. Raises InputError for a name that C does not take, shallow water
+    that the model does not know, and equations of one's own that use more than
+    arithmetic.
     """
     name = checked_name(name or model.name)
     longest = LONGEST_STEP * model.travel_time
-    weather, note = _weather(model, water_depth)
-    numbers = iter([*model.ship_numbers(water_depth, longest), *weather])
+    numbers = iter(model.ship_numbers(water_depth, longest))
     p = Parameters(
         ship=from_columns(Ship, numbers),
         coefficients=from_columns(model.compiled.coefficients, numbers),
-        sea=from_columns(SeaParameters, numbers),
     )
-    without = {"wind_speed", "wind_from"} if note else set()
-    if "n" not in model.command_names:
-        without.add("shaft")
+    without = set() if "n" in model.command_names else {"shaft"}
     inputs = _started(model, SHIP_INPUTS.keys() - without, SHIP_INPUTS)
     shown = {*model.state_names, *model.command_names}
     outputs = _started(model, shown, SHIP_STATES)
-    c = Translator({**model.compiled.hooks(), **OPEN_SEA.functions}, name)
+    c = Translator({**model.compiled.hooks(), "HAS_SEA": True}, name)
     c.structures.labels |= coefficient_labels(model)
     title = f"Ship model '{model.name}'"
     data = {
@@ -142,7 +101,6 @@ def ship_source(
         ship=True,
         title=title,
         sha256=model_hash(model),
-        notes=(note,) if note else (),
     )
 
 
@@ -151,12 +109,12 @@ def _translated(c: Translator, model: ShipModel, p: Parameters) -> dict[str, Any
     structures = c.structures
     start = _start(model)
     begin = Motion(*[start.get(state, 0.0) for state in Motion._fields])
-    given = ShipInput(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    given = ShipInput(0.0, 0.0, 0.0, 0.0)
     for ending, value in (("state", begin), ("input", given)):
         structures.types[structures.kind_of(value)] = f"{structures.prefix}_{ending}"
     header = structures.declared(parameters=p)
     parameters = structures.initialiser(p)
-    step = c.function(advance, begin, given, 0.0, p.coefficients, p.ship, p.sea)
+    step = c.function(advance, begin, given, 0.0, p.coefficients, p.ship)
     has_lost = c.function(lost, begin, p.ship)
     return {
         "begin": structures.initialiser(begin),
@@ -168,21 +126,6 @@ def _translated(c: Translator, model: ShipModel, p: Parameters) -> dict[str, Any
         "advance": step.name,
         "lost": has_lost.name,
     }
-
-
-def _weather(model: ShipModel, water_depth: float) -> tuple[Floats, str]:
-    """Numbers of a weather whose wind comes later, and a note if it has no wind."""
-    wind = Wind(1.0, 0.0, gust=False)
-    weather = Weather(wind=wind)
-    note = ""
-    try:
-        column = weather_column(model, weather, 1.0, water_depth)
-    except InputError as error:
-        note = f"wind is left out: {error}"
-        column = np.array(flat(CALM))
-    wind_speed = leaves(SeaParameters).index("wind_speed")
-    column[wind_speed] = 0.0
-    return column, note
 
 
 def _start(model: ShipModel) -> dict[str, float]:

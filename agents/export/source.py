@@ -53,8 +53,6 @@ class Source:
         What was exported, in the user's own letters.
     sha256 : str
         Hash of the model's numbers.
-    notes : tuple of str
-        What was left out, and why.
     """
 
     name: str
@@ -66,7 +64,6 @@ class Source:
     ship: bool
     title: str
     sha256: str
-    notes: tuple[str, ...] = ()
 
 
 def checked_name(name: str) -> str:

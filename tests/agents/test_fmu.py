@@ -14,7 +14,7 @@ from agents.export.autopilot import autopilot_source
 from agents.export.fmu import write_fmu
 from agents.export.ship_c99 import ship_source
 from shipgym.errors import InputError
-from shipgym.sea import Current, Weather, Wind
+from shipgym.sea import Current, Weather
 from shipgym.tasks import Task
 from tests.agents.bridge import Bridge
 from tests.agents.policies import MARINER
@@ -47,11 +47,9 @@ def test_a_ship_turns_as_in_the_library(tmp_path):
         "rudder": RUDDER,
         "current_north": 0.0,
         "current_east": 0.5,
-        "wind_speed": 8.0,
-        "wind_from": 0.5,
     }
     found = run(path, inputs, inputs.values(), start_values={"u": 7.0})
-    weather = Weather(Current(0.5, 90.0), Wind(8.0, np.degrees(0.5), gust=False))
+    weather = Weather(Current(0.5, 90.0))
     start = MARINER.service_state.copy()
     start[MARINER.state_names.index("u")] = 7.0
     commands = np.full((STEPS, 1), RUDDER)
