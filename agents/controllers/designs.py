@@ -63,7 +63,7 @@ def for_sea(made: Any, task: Task, interval: float) -> dict[str, float]:
         return {}
     if made.has_autopilot:
         return {f"{INNER}wave_period": waves.peak_period}
-    # a Kalman filter knows the course well enough without a model of the waves
+    # a Kalman filter takes most of the waves out already
     filters = made.law is linear_law and made.settings_type is not None
     return {"wave_period": waves.peak_period} if filters else {}
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from agents.controllers.controller import POSITIVE, Bounds, Controller
 from agents.controllers.helm import known, logged_noise, noise_setting
-from agents.controllers.kalman import course_filter, kalman_gain, with_waves
+from agents.controllers.kalman import OUTPUT, course_filter, kalman_gain
 from agents.controllers.law import (
     HelmMemory,
     LinearFeedback,
@@ -45,8 +45,6 @@ class Motions(NamedTuple):
     sway: Number  # m/s
     yaw_rate: Number  # rad/s
     heading_error: Number  # rad
-    wave_heading: Number  # rad, of the first-order motion
-    wave_yaw_rate: Number  # rad/s
 
 
 class Measured(NamedTuple):
@@ -62,8 +60,6 @@ class Transition(NamedTuple):
     sway: Motions
     yaw_rate: Motions
     heading_error: Motions
-    wave_heading: Motions
-    wave_yaw_rate: Motions
 
 
 class KalmanGains(NamedTuple):
@@ -72,15 +68,6 @@ class KalmanGains(NamedTuple):
     sway: Measured
     yaw_rate: Measured
     heading_error: Measured
-    wave_heading: Measured
-    wave_yaw_rate: Measured
-
-
-class Output(NamedTuple):
-    """Rows of the matrix from states to measurements."""
-
-    yaw_rate: Motions
-    heading_error: Motions
 
 
 class Observer(NamedTuple):
@@ -89,7 +76,6 @@ class Observer(NamedTuple):
     transition: Transition
     effect: Motions  # of the mean rudder between two measurements, per rad
     kalman: KalmanGains
-    output: Output
     new_course: float  # rad, least jump of the heading error that is one
     feedback: LinearFeedback
 
@@ -120,7 +106,7 @@ def predicted(
 ) -> Motions:
     """States expected at this measurement; where an episode begins, those measured."""
     began = memory.helm.started > 0.0
-    measured = Motions(0.0, seen.yaw_rate, seen.heading_error, 0.0, 0.0)
+    measured = Motions(0.0, seen.yaw_rate, seen.heading_error)
     expected = [
         np.where(began, product(row, memory.motions) + effect * mean_rudder, first)
         for row, effect, first in zip(p.transition, p.effect, measured, strict=True)
@@ -130,11 +116,10 @@ def predicted(
 
 def updated(seen: Signals, expected: Motions, p: Observer) -> Motions:
     """States expected at this measurement, corrected by it."""
-    off_rate = seen.yaw_rate - product(p.output.yaw_rate, expected)
-    expected_error = product(p.output.heading_error, expected)
-    off_heading = wrapped(seen.heading_error - expected_error)
+    off_heading = wrapped(seen.heading_error - expected.heading_error)
     # a jump that neither noise nor the ship can make is a new course
     jump = np.where(np.abs(off_heading) > p.new_course, off_heading, 0.0)
+    off_rate = seen.yaw_rate - expected.yaw_rate
     innovation = Measured(off_rate, off_heading - jump)
     states = expected._replace(heading_error=expected.heading_error + jump)
     pairs = zip(p.kalman, states, strict=True)
@@ -161,9 +146,6 @@ class LQGSettings(SteeringCost):
         above=0.0,
         search=Step(1.0),
     )
-    wave_heading_deg: float = setting(
-        "standard deviation of the heading in the waves, degrees", 1.0, above=0.0
-    )
 
     def completed(self, model: ShipModel, dt: float) -> Self:
         """Fill in what follows from a model; `dt`: control interval, s.
@@ -189,23 +171,19 @@ class LQG(Controller):
     """LQ feedback of motions that a Kalman filter estimates.
 
     The filter is stationary and reads noisy heading and yaw rate; the measured sway
-    speed is not used. Its states are sway, yaw rate and
-    heading error and, where a wave period is given, heading and rate of the first-order
-    motion, which is not answered with rudder. Its input is the rudder of a model of the
-    gear, which knows its limits. A jump of the heading error that
-    neither noise nor the ship can make is taken as a new course.
+    speed is not used. Its states are sway, yaw rate and heading error. Its input is the
+    rudder of a model of the gear, which knows its limits. A jump of the heading error
+    that neither noise nor the ship can make is taken as a new course.
 
     Attributes
     ----------
-    transition : array of shape (n_states, n_states)
+    transition : array of shape (3, 3)
         From one measurement to the next.
-    input : array of shape (n_states,)
+    input : array of shape (3,)
         Effect of the mean rudder in between.
-    kalman : array of shape (n_states, 2)
+    kalman : array of shape (3, 2)
         Gain on the innovations of yaw rate and heading error, estimate at the time of
         the measurement.
-    output : array of shape (2, n_states)
-        What is measured of the states.
     """
 
     kind: ClassVar[str] = "lqg"
@@ -214,12 +192,7 @@ class LQG(Controller):
     law: ClassVar[Any] = staticmethod(lqg_law)
     memory_record: ClassVar[Record] = LQGMemory
     reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "surge")
-    arrays: ClassVar[Mapping[str, int]] = {
-        "transition": 2,
-        "input": 1,
-        "kalman": 2,
-        "output": 2,
-    }
+    arrays: ClassVar[Mapping[str, int]] = {"transition": 2, "input": 1, "kalman": 2}
     bounds: ClassVar[Mapping[str, Bounds]] = {
         **Controller.bounds,
         "new_course_rad": POSITIVE,
@@ -228,20 +201,16 @@ class LQG(Controller):
     transition: Floats
     input: Floats
     kalman: Floats
-    output: Floats
 
     def __post_init__(self) -> None:
-        n = len(self.input)
-        n_measured = len(Measured._fields)
-        shapes = ((n, n), (n,), (n, n_measured), (n_measured, n))
-        found = tuple([getattr(self, name).shape for name in self.arrays])
-        # sway, yaw rate and heading error; in waves two more
-        if n not in (3, 5) or found != shapes:
+        shapes = [(3, 3), (3,), (3, 2)]
+        found = [getattr(self, name).shape for name in self.arrays]
+        if found != shapes:
             raise InputError(
-                f"arrays: expected {', '.join(self.arrays)} of 3 or 5 states, got"
-                f" shapes {found}"
+                f"arrays: expected {', '.join(self.arrays)} of shapes {shapes}, got"
+                f" {found}"
             )
-        trusted = np.eye(n) - self.kalman @ self.output
+        trusted = np.eye(3) - self.kalman @ OUTPUT
         of_errors = trusted @ self.transition
         check_stable(of_errors, "arrays: transition of the Kalman filter")
 
@@ -261,7 +230,7 @@ class LQG(Controller):
             As in `LQ.from_model`.
         **settings
             Fields of `LQGSettings`: the weights of `LQ`, `noise`, `disturbance_deg`,
-            `wave_period`, `wave_heading_deg`.
+            `wave_period`.
         """
         interval = checked_interval(model, dt)
         own = LQGSettings(**settings).completed(model, interval)
@@ -273,44 +242,32 @@ class LQG(Controller):
         ship = sample_ship(model, interval)
         given: Any = own
         disturbance = float(np.radians(given.disturbance_deg))
-        helm = {**own.helm(model, interval), "wave_period": 0.0}  # the filter has it
         states = course_filter(model, ship.about, interval, disturbance)
-        if own.wave_period:
-            deviation = np.radians(own.wave_heading_deg)
-            states = with_waves(states, own.wave_period, deviation, interval)
         gain, deviations = kalman_gain(states, given.noise)
         new_course = max(NEW_COURSE, GATE * deviations[1])
 
         return cls.designed(
             model,
             ship,
-            {**own.gains(ship, model.travel_time), **helm},
+            {**own.gains(ship, model.travel_time), **own.helm(model, interval)},
             {**known(own), "new_course_rad": new_course},
             transition=states.transition,
             input=states.effect,
             kalman=gain,
-            output=states.output,
         )
 
     @cached_property
     def parameters(self) -> Observer:
-        """Parameters of its law; without a wave model those of the wave are zero."""
-        n_states = len(Motions._fields)
-        n_measured = len(Measured._fields)
-        square = (n_states, n_states)
+        """Parameters of its law."""
         return Observer(
-            transition=_filled(Transition, self.transition, square),
-            effect=_filled(Motions, self.input, (n_states,)),
-            kalman=_filled(KalmanGains, self.kalman, (n_states, n_measured)),
-            output=_filled(Output, self.output, (n_measured, n_states)),
+            transition=_by_rows(Transition, self.transition),
+            effect=_by_rows(Motions, self.input),
+            kalman=_by_rows(KalmanGains, self.kalman),
             new_course=self.design["new_course_rad"],
             feedback=self.linear_feedback,
         )
 
 
-def _filled(record: Record, numbers: Floats, shape: tuple[int, ...]) -> Any:
-    """Record of an array, row by row, with zeros behind it up to a shape."""
-    missing = np.subtract(shape, numbers.shape)
-    whole = np.pad(numbers, [(0, n) for n in missing])
-    flat = whole.ravel().tolist()
-    return from_columns(record, iter(flat))
+def _by_rows(record: Record, numbers: Floats) -> Any:
+    """Record of an array, row by row."""
+    return from_columns(record, iter(numbers.ravel().tolist()))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, LQG, load_agent, sail
-from agents.controllers.kalman import course_filter, kalman_gain
+from agents.controllers.kalman import OUTPUT, course_filter, kalman_gain
 from agents.controllers.linear_loop import sample_ship
 from shipgym.errors import InputError
 from shipgym.instruments.noise import SEA_TRIAL
@@ -18,7 +18,7 @@ UNSTABLE = changed(N_v=1.7, N_uv=1.7)
 
 def test_the_kalman_gain_is_that_of_python_control_and_of_the_recursion():
     states = course_filter(MARINER, straight_running(MARINER), 1.0, disturbance=0.04)
-    transition, output, process = states.transition, states.output, states.process
+    transition, output, process = states.transition, OUTPUT, states.process
     noise = np.diag([SEA_TRIAL["yaw_rate"], SEA_TRIAL["heading"]]) ** 2
     gain, deviation = kalman_gain(states, noise=1.0)
     predictor, _, _ = control.dlqe(transition, np.eye(3), output, process, noise)
@@ -41,7 +41,7 @@ def test_poles_of_the_loop_are_those_of_lq_and_of_the_filter(model):
     lqg, ship = LQG.from_model(model), sample_ship(model, control_interval(model))
     poles = np.linalg.eigvals(lqg.loop().closed_loop(ship))
     regulator = np.linalg.eigvals(LQ.from_model(model).loop().closed_loop(ship))
-    trusted = np.eye(3) - lqg.kalman @ lqg.output
+    trusted = np.eye(3) - lqg.kalman @ OUTPUT
     observer = np.linalg.eigvals(trusted @ lqg.transition)
     for pole in (*regulator, *observer):
         assert np.abs(poles - pole).min() < 0.02
