@@ -90,9 +90,8 @@ class Options:
         precedence.
     wind : str or table
         Force of the wind in columns wind_speed and wind_from. "auto": by Blendermann's
-        coefficients; "none": not removed; or a name of coefficients, or a table such as
-        `{ coefficients = "blendermann-ferry", relative = true }` (relative: felt on
-        board, measured from the bow).
+        coefficients; "none": not removed; `{ relative = true }`: the wind is that felt
+        on board, measured from the bow.
     rudder_bias : {"auto", "none"}
         "auto": a structure without a constant gets one where the bias of the rudder
         differs from zero; "none": it stays as it is.

@@ -22,7 +22,6 @@ from shipgym.checks import (
     check_flag,
     check_keys,
     check_number,
-    check_text,
 )
 from shipgym.models.simulate import WIND
 from shipgym.sea.harmonics import circle
@@ -48,18 +47,14 @@ def measured_wind(
     particulars : Particulars
         Of the ship.
     option : str or mapping
-        Coefficients as in `shipgym.sea.Wind`, or a table of ``coefficients`` and
-        ``relative``: whether speed and direction are those felt on board, the latter
-        from the bow.
+        A word, or a table of ``relative``: whether speed and direction are those felt
+        on board, the latter from the bow.
     """
-    table = option if isinstance(option, Mapping) else {"coefficients": option}
     if not {"wind_speed", "wind_from", "psi", "u", "v"} <= trial.channels.keys():
         return trial
-    coefficients = table.get("coefficients", "auto")
-    if coefficients == "auto":
-        coefficients = "blendermann"
-    curves = wind_curves(particulars, coefficients)
-    ahead, aside = _felt_wind(trial, bool(table.get("relative", False)))
+    curves = wind_curves(particulars)
+    is_relative = isinstance(option, Mapping) and option.get("relative", False)
+    ahead, aside = _felt_wind(trial, is_relative)
     angle = np.arctan2(aside, ahead)
     by_angle = [
         np.interp(angle, circle(), row, period=2.0 * np.pi)
@@ -329,11 +324,11 @@ def check_current(option: Any) -> None:
 
 
 def check_wind(option: Any) -> None:
-    """Refuse a wind that is neither a word nor a table of coefficients."""
+    """Refuse a wind that is neither a known word nor a table."""
     if not isinstance(option, Mapping):
-        check_text(option, "wind")
+        check_choice(option, ("auto", "none"), "wind", " or a table: relative = true")
         return
-    check_keys(option, ("coefficients", "relative"), "wind")
+    check_keys(option, ("relative",), "wind")
     check_flag(option.get("relative", False), "wind relative")
 
 

@@ -19,7 +19,6 @@ from shipgym.checks import (
 )
 from shipgym.constants import GRAVITY
 from shipgym.errors import InputError
-from shipgym.sea.wind_coefficients import check_coefficients
 
 
 def _direction() -> Any:
@@ -77,19 +76,14 @@ class Wind:
         episode of an environment.
     gust : bool
         True for a speed that varies about its mean.
-    coefficients : str
-        "blendermann" (type of ship guessed from its fullness), or "blendermann-" and a
-        type of ship.
     """
 
     speed: float = bounded(at_least=0.0, at_most=75.0)
     from_deg: float | None = _direction()
     gust: bool = True
-    coefficients: str = "blendermann"
 
     def __post_init__(self) -> None:
         keep_numbers(self, "wind ")
-        check_coefficients(self.coefficients, "wind coefficients")
         check_flag(self.gust, "wind gust")
 
     @property

@@ -65,7 +65,7 @@ def with_wind(
 ) -> SeaParameters:
     """Parameters of a sea with a wind, and what it does to a ship."""
     mobility = mobility_matrix(model, water_depth)
-    curves = wind_curves(model.particulars, wind.coefficients)
+    curves = wind_curves(model.particulars)
     by_wind = _response(mobility, harmonics(curves, HARMONICS, 0.5 * AIR_DENSITY))
     return sea._replace(
         wind_speed=wind.speed,

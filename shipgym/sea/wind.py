@@ -1,19 +1,16 @@
 """Wind forces on a ship over the direction of the relative wind, and gusts."""
 
 from math import gamma, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
+from numpy import cos, sin, where
 
+from shipgym.arrays import Floats
 from shipgym.sea.conditions import Wind
 from shipgym.sea.estimates import weather_particulars
 from shipgym.sea.filters import GaussMarkov
 from shipgym.sea.harmonics import Curves, circle
-from shipgym.sea.wind_coefficients import (
-    BLENDERMANN,
-    blendermann_coefficients,
-    blendermann_type,
-    check_coefficients,
-)
 from shipgym.ships.particulars import Particulars
 
 #: Surface drag coefficient of Harris's spectrum for a rough sea.
@@ -26,18 +23,37 @@ HARRIS_VARIANCE = 2.0 ** (2.0 / 3.0) * (
 AIR_DENSITY = 1.225
 
 
-def wind_curves(particulars: Particulars, coefficients: str = "blendermann") -> Curves:
+class Blendermann(NamedTuple):
+    """Coefficients of a type of ship."""
+
+    CD_t: float  # transverse resistance, by lateral area
+    # longitudinal resistance in head and in following wind, by frontal area
+    CD_l_bow: float
+    CD_l_stern: float
+    delta: float  # cross-force parameter
+    kappa: float  # rolling-moment factor
+
+
+#: By least block coefficient: a loaded tanker, cargo ship and container ship.
+#: Blendermann 1994, Parameter identification of wind loads on ships, J. Wind
+#: Engineering and Industrial Aerodynamics 51; as in Fossen 2021, section 10.1.2.
+BLENDERMANN = {
+    0.75: Blendermann(0.70, 0.90, 0.55, 0.40, 3.1),
+    0.65: Blendermann(0.85, 0.65, 0.55, 0.40, 1.7),
+    0.0: Blendermann(0.90, 0.55, 0.55, 0.40, 1.4),
+}
+
+
+def wind_curves(particulars: Particulars) -> Curves:
     """Wind forces of a ship by dynamic pressure, 0.5 air density relative speed^2.
 
     Over all directions of the relative wind: where (u_rw, v_rw) is the ship's velocity
     through the air in body axes and V its length, cos(angle) = u_rw / V and sin(angle)
-    = v_rw / V. X and Y in m2, N and K in m3; coefficients as in `Wind`.
+    = v_rw / V. X and Y in m2, N and K in m3; coefficients by the fullness of the hull.
 
     Areas, centroid and length overall are estimated where not given
-    (`weather_particulars`). Raises InputError for unknown coefficients, or particulars
-    too few to estimate the areas.
+    (`weather_particulars`). Raises InputError for particulars too few to estimate them.
     """
-    check_coefficients(coefficients, "wind coefficients")
     ship = weather_particulars(particulars)
     frontal = ship.require("frontal_area")
     lateral = ship.require("lateral_area")
@@ -49,9 +65,9 @@ def wind_curves(particulars: Particulars, coefficients: str = "blendermann") -> 
     folded = np.where(from_starboard, angle, 2.0 * np.pi - angle)
     to_lee = np.where(from_starboard, -1.0, 1.0)
 
-    type_of_ship = blendermann_type(coefficients, ship.require("block_coefficient"))
-    row = BLENDERMANN[type_of_ship]
-    CX, CY = blendermann_coefficients(row, folded, area_ratio=frontal / lateral)
+    fullness = ship.require("block_coefficient")
+    row = next(row for least, row in BLENDERMANN.items() if fullness >= least)
+    CX, CY = coefficients(row, folded, area_ratio=frontal / lateral)
     sway = to_lee * lateral * CY
     from_abeam = folded - 0.5 * pi
     lever = ship.require("lateral_centroid") - 0.18 * length * from_abeam
@@ -61,6 +77,24 @@ def wind_curves(particulars: Particulars, coefficients: str = "blendermann") -> 
         N=lever * sway,
         K=row.kappa * height * sway,
     )
+
+
+def coefficients(
+    row: Blendermann, angle: Floats, area_ratio: float
+) -> tuple[Floats, Floats]:
+    """Coefficients of surge, by frontal area, and of sway to lee, by lateral area.
+
+    Fossen 2021, section 10.1.2. `angle` is from 0 (ahead) to pi (astern), `area_ratio`
+    the frontal by the lateral area.
+    """
+    CD_l_AF = where(angle <= pi / 2, row.CD_l_bow, row.CD_l_stern)
+    CD_l = CD_l_AF * area_ratio
+    cross_force = 0.5 * row.delta * (1.0 - CD_l / row.CD_t)
+    oblique = sin(2.0 * angle) ** 2
+    denominator = 1.0 - cross_force * oblique
+    surge = -CD_l_AF * cos(angle)
+    sway = row.CD_t * sin(angle)
+    return surge / denominator, sway / denominator
 
 
 def gust_filter(wind: Wind) -> GaussMarkov:

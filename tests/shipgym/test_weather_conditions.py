@@ -42,7 +42,7 @@ def test_calm_is_calm_unless_there_is_a_current():
             "slight", from_deg=None, current=Current(0.7, 180.0, 0.1, 300.0)
         ),
         Weather(
-            wind=Wind(12.0, 30.0, gust=False, coefficients="blendermann-ferry"),
+            wind=Wind(12.0, 30.0, gust=False),
             name="tunnel",
         ),
         Weather(waves=Waves(2.0, 9.0, -30.0, 1.0, spreading="long-crested")),
@@ -71,10 +71,6 @@ STATES = r"expected one of 'calm', .*'rough'; for another sea give .*, got "
         (lambda: Weather.from_dict({"wind": {}}), "weather wind: .*'speed' is missing"),
         (lambda: Wind(5.0, 400.0), "wind from_deg: .*clockwise from north"),
         (lambda: Wind(5.0, gust="yes"), "wind gust: "),
-        (
-            lambda: Wind(5.0, coefficients="blendermann-tankerloaded"),
-            "wind coefficients: expected one of .*mean 'blendermann-tanker",
-        ),
         (lambda: Waves(3.0, 3.0), "expected at most 1.4.* peak_period 3, got 3; steep"),
         (lambda: Waves(np.nan, 8.0), "waves significant_height: "),
         (lambda: Waves(1.0, 0.0), "waves peak_period: .*> 0"),
