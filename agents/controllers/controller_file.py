@@ -102,13 +102,7 @@ def _parts(content: Mapping[str, Any], design: type[Controller]) -> dict[str, An
     parts: dict[str, Any] = {}
     if design.has_autopilot:
         table = check_table(content["autopilot"], "autopilot")
-        autopilot = read_controller(table, "autopilot")
-        if autopilot.has_autopilot:
-            raise InputError(
-                "autopilot: expected a controller that keeps a heading, got"
-                f" '{autopilot.kind}'"
-            )
-        parts["autopilot"] = autopilot
+        parts["autopilot"] = read_controller(table, "autopilot")
     if design.has_ship:
         table = check_table(content["ship"], "ship")
         parts["ship"] = ShipModel.from_dict(table, "ship")

@@ -8,7 +8,7 @@ the ship, rad.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -33,9 +33,10 @@ from agents.controllers.memory import (
     on_course,
     recalled,
 )
-from agents.settings import Step, setting
+from agents.settings import Settings, Step, setting
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
+from shipgym.models.by_name import takes_name
 from shipgym.tasks.scales import OBSERVATION_NAMES
 from shipgym.tasks.task import Task, path_following_task
 
@@ -60,6 +61,31 @@ class GuidanceMemory(NamedTuple):
     started: Number  # 0 where an episode begins, else 1
 
 
+@dataclass(frozen=True)
+class GuidanceSettings(Settings):
+    """Settings of all guidance."""
+
+    lookahead_lengths: float | None = setting(
+        "lookahead, ship lengths; by default that of the task. Longer turns gentler,"
+        " shorter comes back sooner",
+        None,
+        above=0.0,
+        search=Step(0.5),
+    )
+
+    def completed(
+        self, model: ShipModel, task: Task, autopilot: Controller | None = None
+    ) -> Self:
+        """Fill in what follows from a model, a task and the autopilot that is led."""
+        if self.lookahead_lengths is not None:
+            return self
+        return replace(self, lookahead_lengths=task.lookahead)
+
+    def design(self, model: ShipModel, task: Task) -> dict[str, Any]:
+        """How the gains were found, for the file; of whole settings."""
+        return self.to_dict()
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Guided(Controller):
     """A heading autopilot that is led along a path.
@@ -73,6 +99,8 @@ class Guided(Controller):
     #: What its law reads of `PathSignals` beside the heading error.
     reads: ClassVar[tuple[str, ...]] = ("cross_track",)
     has_autopilot: ClassVar[bool] = True
+    settings_type: ClassVar[type[Settings]] = GuidanceSettings
+    leads: ClassVar[type[Controller]] = Controller
     bounds: ClassVar[Mapping[str, Bounds]] = {
         **Controller.bounds,
         **dict.fromkeys(("lookahead", "task_lookahead"), POSITIVE),
@@ -80,47 +108,72 @@ class Guided(Controller):
 
     autopilot: Controller  # steers by the first eight observations
 
+    def __post_init__(self) -> None:
+        self.check_leads(self.autopilot)
+
     @classmethod
-    def leading(
+    @takes_name
+    def from_model(
         cls,
         model: ShipModel,
-        autopilot: Controller | None,
-        task: Task,
-        gains: Mapping[str, float],
-        design: Mapping[str, float],
+        *,
+        autopilot: Controller | None = None,
+        task: Task | None = None,
+        **settings: Any,
     ) -> Self:
-        """Make guidance of an autopilot, by default LQ, along the paths of a task.
+        """Lead an autopilot along the paths of a task.
 
-        `gains`: SI units; `design`: how they were found. Raises InputError if the
-        autopilot keeps no heading or was designed for another ship, or the task does
-        not show what guidance observes.
+        Raises InputError if a setting is out of its range, the autopilot keeps no
+        heading or was designed for another ship, or the task has no path or does not
+        show what guidance observes.
+
+        Parameters
+        ----------
+        model : ShipModel
+            The ship; MPC simulates her in the current observed.
+        autopilot : Controller, optional
+            Any that keeps a heading, of `PreviewLQ` and `MPC` an LQ; by default
+            `LQ.from_model(model)`.
+        task : Task, optional
+            Its path, lookahead and control interval are used, and by `MPC` its weights;
+            by default the environment's own.
+        **settings
+            Fields of the class's `settings_type`.
         """
-        dt = task.interval(model)
+        asked = with_path(task)
+        dt = asked.interval(model)
         pilot = LQ.from_model(model, dt=dt) if autopilot is None else autopilot
-        if not isinstance(pilot, Controller) or pilot.has_autopilot:
-            raise InputError(
-                "autopilot: expected a controller that keeps a heading, got"
-                f" {type(pilot).__name__}"
-            )
+        cls.check_leads(pilot)
         pilot.check_fits_model(model)
 
-        names = cls.observed_in(task, model)
-        scales = _scales_of(task, model, names)
-        task_lookahead = task.lookahead * model.particulars["length"]
+        own: Any = cls.settings_type(**settings)
+        own = own.completed(model, asked, pilot)
+        names = cls.observed_in(asked, model)
+        gains = own.gains(model, asked, pilot)
+        task_lookahead = asked.lookahead * model.particulars["length"]
         design_model = {"ship": model} if cls.has_ship else {}
         return cls(
             gains={**gains, "task_lookahead": task_lookahead},
             neutral_rudder=pilot.neutral_rudder,
             neutral_sway=pilot.neutral_sway,
             margins=pilot.margins,
-            observation_scales=scales,
+            observation_scales=_scales_of(asked, model, names),
             observation_names=names,
             model_name=pilot.model_name,
             model_sha256=pilot.model_sha256,
-            design={"dt": dt, **design},
+            design={"dt": dt, **own.design(model, asked)},
             autopilot=pilot,
             **design_model,
         )
+
+    @classmethod
+    def check_leads(cls, autopilot: Any) -> None:
+        """Refuse an autopilot that it cannot lead."""
+        if not isinstance(autopilot, cls.leads) or autopilot.has_autopilot:
+            other = "LQ" if cls.leads is LQ else "a controller that keeps a heading"
+            raise InputError(
+                f"autopilot: expected {other}, got {type(autopilot).__name__}"
+            )
 
     @classmethod
     def observed_in(cls, task: Task, model: ShipModel) -> tuple[str, ...]:
@@ -259,22 +312,6 @@ class Guided(Controller):
     def to_dict(self) -> dict[str, Any]:
         """Content of the file, of guidance and autopilot."""
         return {**super().to_dict(), "autopilot": self.autopilot.to_dict()}
-
-
-def lookahead_setting() -> Any:
-    """Setting of all guidance."""
-    return setting(
-        "lookahead, ship lengths; by default that of the task. Longer turns gentler,"
-        " shorter comes back sooner",
-        None,
-        above=0.0,
-        search=Step(0.5),
-    )
-
-
-def own_lookahead(lengths: float | None, task: Task) -> float:
-    """Lookahead, ship lengths, by default that of a task."""
-    return task.lookahead if lengths is None else lengths
 
 
 def with_path(task: Task | None) -> Task:

@@ -12,17 +12,11 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from agents.controllers.controller import Controller
-from agents.controllers.guided import (
-    Guided,
-    lookahead_setting,
-    own_lookahead,
-    with_path,
-)
+from agents.controllers.guided import GuidanceSettings, Guided
 from agents.controllers.law import Number, PathSignals
 from agents.settings import Settings, Step, setting
 from shipgym import ShipModel
 from shipgym.engine.records import Record
-from shipgym.models.by_name import takes_name
 from shipgym.tasks.task import Task
 
 # integral time over lookahead time with which s^2 + s / T + 1 / (T Ti) has a double
@@ -58,10 +52,9 @@ def integral_line_of_sight(
 
 
 @dataclass(frozen=True)
-class LineOfSightSettings(Settings):
+class LineOfSightSettings(GuidanceSettings):
     """Settings of integral line of sight."""
 
-    lookahead_lengths: float | None = lookahead_setting()
     integral_lengths: float | None = setting(
         "time over which a steady cross-track error is integrated to as much again, in"
         " times to travel one ship length; by default 4 times `lookahead_lengths`, with"
@@ -72,13 +65,23 @@ class LineOfSightSettings(Settings):
         search=Step(0.5),
     )
 
-    def completed(self, model: ShipModel, task: Task) -> Self:
-        """Fill in what follows from a task."""
-        lookahead = own_lookahead(self.lookahead_lengths, task)
-        integral = self.integral_lengths
-        if integral is None:
-            integral = CRITICAL * lookahead
-        return replace(self, lookahead_lengths=lookahead, integral_lengths=integral)
+    def completed(
+        self, model: ShipModel, task: Task, autopilot: Controller | None = None
+    ) -> Self:
+        """See `GuidanceSettings.completed`."""
+        own = super().completed(model, task)
+        if own.integral_lengths is not None:
+            return own
+        lookahead: Any = own.lookahead_lengths
+        return replace(own, integral_lengths=CRITICAL * lookahead)
+
+    def gains(self, model: ShipModel, task: Task, autopilot: Any) -> dict[str, float]:
+        """Gains in SI units; of whole settings."""
+        own: Any = self
+        return {
+            "lookahead": own.lookahead_lengths * model.particulars["length"],
+            "integral": 1.0 / (own.integral_lengths * model.travel_time),
+        }
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -93,41 +96,6 @@ class IntegralLineOfSight(Guided):
     law: ClassVar[Any] = staticmethod(integral_line_of_sight)
     memory_record: ClassVar[Record] = DriftMemory
     gain_names: ClassVar[tuple[str, ...]] = (*Guided.gain_names, "integral")
-
-    @classmethod
-    @takes_name
-    def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        autopilot: Controller | None = None,
-        task: Task | None = None,
-        **settings: Any,
-    ) -> Self:
-        """Lead an autopilot along the paths of a task.
-
-        Raises InputError if a setting is out of its range or the autopilot was designed
-        for another ship.
-
-        Parameters
-        ----------
-        model : ShipModel
-            The ship.
-        autopilot : Controller, optional
-            Any that keeps a heading; by default `LQ.from_model(model)`.
-        task : Task, optional
-            Its lookahead, corridor and control interval are used; by default the
-            environment's own.
-        **settings
-            Fields of `LineOfSightSettings`: `lookahead_lengths`, `integral_lengths`.
-        """
-        asked = with_path(task)
-        own: Any = LineOfSightSettings(**settings).completed(model, asked)
-        gains = {
-            "lookahead": own.lookahead_lengths * model.particulars["length"],
-            "integral": 1.0 / (own.integral_lengths * model.travel_time),
-        }
-        return cls.leading(model, autopilot, asked, gains, own.to_dict())
 
     @cached_property
     def parameters(self) -> LineOfSightGains:

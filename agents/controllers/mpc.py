@@ -13,14 +13,14 @@ control, Journal of Guidance, Control, and Dynamics 40 (sampling on the model).
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from agents.controllers.controller import ANY_NUMBER, POSITIVE, Bounds, Controller
-from agents.controllers.guided import bend, with_path
+from agents.controllers.guided import bend
 from agents.controllers.law import (
     HelmMemory,
     Nothing,
@@ -34,11 +34,10 @@ from agents.controllers.lq import LQ
 from agents.controllers.memory import selected
 from agents.controllers.wheel_over import WheelOver, WheelOverSettings
 from agents.settings import Settings, Step, setting
-from shipgym import InputError, ShipModel
+from shipgym import ShipModel
 from shipgym.arrays import Floats
 from shipgym.engine.records import Record, table_of
 from shipgym.envs.engine import Engine
-from shipgym.models.by_name import takes_name
 from shipgym.tasks.scales import STEPS_PER_LENGTH
 from shipgym.tasks.steering import HEADING_SCALE
 from shipgym.tasks.task import Task, course_keeping_task
@@ -84,6 +83,18 @@ class MPCSettings(WheelOverSettings):
         search=Step(0.5),
     )
 
+    def design(self, model: ShipModel, task: Task) -> dict[str, Any]:
+        """See `GuidanceSettings.design`, with the weights of the task."""
+        step = COARSE * task.interval(model)
+        steps = round(self.horizon_lengths * model.travel_time / step)
+        return {
+            **self.to_dict(),
+            "horizon_steps": float(max(1, steps)),
+            "deviation": float(np.radians(self.deviation_deg)),
+            "water_depth": min(task.water_depth, DEEP),
+            **path_costs(task, model),
+        }
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MPC(WheelOver):
@@ -93,6 +104,7 @@ class MPC(WheelOver):
     settings_type: ClassVar[type[Settings]] = MPCSettings
     has_ship: ClassVar[bool] = True
     memory_record: ClassVar[Record] = PlanMemory
+    leads: ClassVar[type[Controller]] = LQ
     reads: ClassVar[tuple[str, ...]] = (*WheelOver.reads, "yaw_rate", "rudder")
     bounds: ClassVar[Mapping[str, Bounds]] = {
         **WheelOver.bounds,
@@ -105,49 +117,6 @@ class MPC(WheelOver):
     }
 
     ship: ShipModel
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.autopilot, LQ):
-            name = type(self.autopilot).__name__
-            raise InputError(f"autopilot: expected LQ, got {name}")
-
-    @classmethod
-    @takes_name
-    def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        autopilot: Controller | None = None,
-        task: Task | None = None,
-        **settings: Any,
-    ) -> Self:
-        """Lead LQ along the paths of a task.
-
-        Parameters
-        ----------
-        model : ShipModel
-            The design model, which is simulated in the current observed.
-        autopilot : LQ, optional
-            By default `LQ.from_model(model)`.
-        task : Task, optional
-            Also its weights are used; by default the environment's own.
-        **settings
-            Fields of `MPCSettings`: those of `WheelOver`, `horizon_lengths`,
-            `deviation_deg`. Errors as in `WheelOver.from_model`.
-        """
-        asked = with_path(task)
-        guide = super().from_model(model, autopilot=autopilot, task=asked, **settings)
-        own = guide.design
-        horizon_s = own["horizon_lengths"] * model.travel_time
-        steps = round(horizon_s / (COARSE * guide.design["dt"]))
-        design = {
-            **own,
-            "horizon_steps": float(max(1, steps)),
-            "deviation": float(np.radians(own["deviation_deg"])),
-            "water_depth": min(asked.water_depth, DEEP),
-            **path_costs(asked, model),
-        }
-        return replace(guide, design=design)
 
     def to_dict(self) -> dict[str, Any]:
         """Content of the file, with the design model."""

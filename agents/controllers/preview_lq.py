@@ -25,10 +25,8 @@ from agents.controllers.controller import POSITIVE, Bounds, Controller
 from agents.controllers.guided import (
     COURSE_ERROR,
     TURNS,
+    GuidanceSettings,
     Guided,
-    lookahead_setting,
-    own_lookahead,
-    with_path,
 )
 from agents.controllers.law import (
     Number,
@@ -48,7 +46,6 @@ from agents.controllers.wheel_over import own_lead
 from agents.settings import Settings, Step, setting
 from shipgym import InputError, ShipModel
 from shipgym.engine.records import Record
-from shipgym.models.by_name import takes_name
 from shipgym.tasks.task import Task
 
 
@@ -224,14 +221,13 @@ def curvature_weight(place: str, default: float) -> Any:
 
 
 @dataclass(frozen=True)
-class PreviewSettings(Settings):
+class PreviewSettings(GuidanceSettings):
     """Settings of LQ with preview.
 
     The weights are by default those of the mean course of the path from half of
     `own_lead` ahead to one and a half.
     """
 
-    lookahead_lengths: float | None = lookahead_setting()
     reach_lengths: float | None = setting(
         "how far ahead the path's curvature counts, ship lengths; by default five times"
         " `own_lead`",
@@ -304,37 +300,33 @@ class PreviewSettings(Settings):
     def completed(
         self, model: ShipModel, task: Task, autopilot: Controller | None = None
     ) -> Self:
-        """Fill in what follows from a model, a task and the autopilot that is led."""
-        reach, share = self.reach_lengths, self.course_share
+        """See `GuidanceSettings.completed`."""
+        own = super().completed(model, task)
+        reach, share = own.reach_lengths, own.course_share
         if reach is None:
             reach = 5.0 * own_lead(model, autopilot)
         if share is None:
             share = 0.0 if task.weather.waves is None else 0.5
-        return replace(
-            self,
-            lookahead_lengths=own_lookahead(self.lookahead_lengths, task),
-            reach_lengths=reach,
-            course_share=share,
-        )
-
-    def check_heel(self, shown: bool) -> None:
-        """Refuse gains on heel that a task does not show; InputError names them."""
-        feels_heel = self.roll_gain != 0.0 or self.roll_time != 0.0
-        if feels_heel and not shown:
-            raise InputError(
-                "roll_gain, roll_time: expected 0 for a task that does not show heel,"
-                f" got {self.roll_gain:g} and {self.roll_time:g}; give"
-                " path_following_task(roll=True), or leave them out"
-            )
+        return replace(own, reach_lengths=reach, course_share=share)
 
     def gains(self, model: ShipModel, task: Task, autopilot: LQ) -> dict[str, float]:
-        """Gains in SI units on the paths of a task, around LQ; of whole settings."""
+        """Gains in SI units, around LQ; of whole settings.
+
+        Raises InputError for gains on heel where the task does not show it.
+        """
         own: Any = self
         dt = task.interval(model)
         inner = autopilot.gains
         length, speed = model.particulars["length"], model.particulars["speed"]
         travel_time = model.travel_time
         scales = {quantity.name: quantity.scale for quantity in task.observed(model)}
+        feels_heel = self.roll_gain != 0.0 or self.roll_time != 0.0
+        if feels_heel and "roll" not in scales:
+            raise InputError(
+                "roll_gain, roll_time: expected 0 for a task that does not show heel,"
+                f" got {self.roll_gain:g} and {self.roll_time:g}; give"
+                " path_following_task(roll=True), or leave them out"
+            )
         in_si = {
             "lookahead": length * own.lookahead_lengths,
             "reach": length * own.reach_lengths,
@@ -358,12 +350,18 @@ class PreviewSettings(Settings):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PreviewLQ(Guided):
-    """LQ around the course of the path ahead: track keeping by 23 numbers."""
+    """LQ around the course of the path ahead: track keeping by 23 numbers.
+
+    The defaults follow from the model: by the lead, the distance that her heading and
+    her way lag behind in a steady turn (`own_lead`), the path's course is averaged from
+    half a lead ahead to one and a half.
+    """
 
     kind: ClassVar[str] = "preview-lq"
     settings_type: ClassVar[type[Settings]] = PreviewSettings
     law: ClassVar[Any] = staticmethod(preview_law)
     memory_record: ClassVar[Record] = PreviewMemory
+    leads: ClassVar[type[Controller]] = LQ
     observes: ClassVar[tuple[str, ...]] = (*Guided.observes, *COURSE_ERROR, *TURNS)
     may_observe: ClassVar[tuple[str, ...]] = ("roll", "roll_rate")
     reads: ClassVar[tuple[str, ...]] = (
@@ -385,45 +383,6 @@ class PreviewLQ(Guided):
         ),
     }
 
-    @classmethod
-    @takes_name
-    def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        autopilot: Controller | None = None,
-        task: Task | None = None,
-        **settings: Any,
-    ) -> Self:
-        """Design on a model, for the paths of a task.
-
-        The defaults follow from the model: by the lead, the distance that her heading
-        and her way lag behind in a steady turn (`own_lead`), the path's course is
-        averaged from half a lead ahead to one and a half.
-
-        Raises InputError if a setting is out of its range, the autopilot is not LQ, or
-        it was designed for another ship, for a task without a path, and for gains on
-        heel where the task does not show it.
-
-        Parameters
-        ----------
-        model : ShipModel
-            The ship.
-        autopilot : LQ, optional
-            By default `LQ.from_model(model)`.
-        task : Task, optional
-            Its lookahead, turns and control interval are used; by default the
-            environment's own.
-        **settings
-            Fields of `PreviewSettings`.
-        """
-        asked = with_path(task)
-        led = led_lq(autopilot, model, asked)
-        own = PreviewSettings(**settings).completed(model, asked, led)
-        own.check_heel(shown="roll" in cls.observed_in(asked, model))
-        gains = own.gains(model, asked, led)
-        return cls.leading(model, led, asked, gains, own.to_dict())
-
     @property
     def needed_signals(self) -> tuple[str, ...]:
         """Signals that it reads, heel where it is observed."""
@@ -434,13 +393,3 @@ class PreviewLQ(Guided):
     def parameters(self) -> PreviewGains:
         """Parameters of its law."""
         return PreviewGains(*[self.gains[name] for name in PreviewGains._fields])
-
-
-def led_lq(autopilot: Controller | None, model: ShipModel, task: Task) -> LQ:
-    """LQ that is led, by default designed on the model; InputError for another kind."""
-    if autopilot is None:
-        return LQ.from_model(model, dt=task.interval(model))
-    if not isinstance(autopilot, LQ):
-        name = type(autopilot).__name__
-        raise InputError(f"autopilot: expected LQ, got {name}")
-    return autopilot

@@ -19,11 +19,9 @@ from agents.controllers.controller import POSITIVE, Bounds, Controller
 from agents.controllers.guided import (
     COURSE_ERROR,
     TURNS,
+    GuidanceSettings,
     Guided,
     bend,
-    lookahead_setting,
-    own_lookahead,
-    with_path,
 )
 from agents.controllers.law import (
     Nothing,
@@ -35,7 +33,6 @@ from agents.controllers.linear_loop import small_motions
 from agents.controllers.lq import LQ
 from agents.settings import Settings, Step, setting
 from shipgym import ShipModel
-from shipgym.models.by_name import takes_name
 from shipgym.tasks.task import Task
 
 SHORTEST_LEAD, LONGEST_LEAD = 0.1, 10.0  # ship lengths
@@ -62,10 +59,9 @@ def wheel_over_law(
 
 
 @dataclass(frozen=True)
-class WheelOverSettings(Settings):
+class WheelOverSettings(GuidanceSettings):
     """Settings of wheel-over."""
 
-    lookahead_lengths: float | None = lookahead_setting()
     reach_lengths: float | None = setting(
         "how far ahead the path's course is taken, ship lengths; by default `own_lead`",
         None,
@@ -83,12 +79,22 @@ class WheelOverSettings(Settings):
     def completed(
         self, model: ShipModel, task: Task, autopilot: Controller | None = None
     ) -> Self:
-        """Fill in what follows from a model, a task and the autopilot that is led."""
-        reach = self.reach_lengths
-        if reach is None:
-            reach = own_lead(model, autopilot)
-        lookahead = own_lookahead(self.lookahead_lengths, task)
-        return replace(self, lookahead_lengths=lookahead, reach_lengths=reach)
+        """See `GuidanceSettings.completed`."""
+        own = super().completed(model, task)
+        if own.reach_lengths is not None:
+            return own
+        return replace(own, reach_lengths=own_lead(model, autopilot))
+
+    def gains(self, model: ShipModel, task: Task, autopilot: Any) -> dict[str, float]:
+        """Gains in SI units; of whole settings."""
+        own: Any = self
+        length = model.particulars["length"]
+        return {
+            "lookahead": length * own.lookahead_lengths,
+            "turn_reach": length * own.reach_lengths,
+            "crab_share": own.crab_share,
+            "path_radius": length * task.turn_radius,
+        }
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -116,41 +122,6 @@ class WheelOver(Guided):
         **Guided.bounds,
         "path_radius": POSITIVE,
     }
-
-    @classmethod
-    @takes_name
-    def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        autopilot: Controller | None = None,
-        task: Task | None = None,
-        **settings: Any,
-    ) -> Self:
-        """Lead an autopilot along the paths of a task.
-
-        Raises InputError if a setting is out of its range, or the autopilot was
-        designed for another ship.
-
-        Parameters
-        ----------
-        model, autopilot, task
-            As in `IntegralLineOfSight.from_model`.
-        **settings
-            Fields of the class's `settings_type`; of `WheelOverSettings`:
-            `lookahead_lengths`, `reach_lengths`, `crab_share`.
-        """
-        asked = with_path(task)
-        own: Any = cls.settings_type(**settings)
-        own = own.completed(model, asked, autopilot)
-        length = model.particulars["length"]
-        gains = {
-            "lookahead": length * own.lookahead_lengths,
-            "turn_reach": length * own.reach_lengths,
-            "crab_share": own.crab_share,
-            "path_radius": length * asked.turn_radius,
-        }
-        return cls.leading(model, autopilot, asked, gains, own.to_dict())
 
     @cached_property
     def parameters(self) -> WheelOverGains:

@@ -95,9 +95,8 @@ BAD_FILES = [
         "scales: expected a list of numbers, size 8",
     ),
     ("pid", {"observation_scales": [*SCALES[:7], -1.0]}, "scales: 'heading_error_int"),
-    ("lqg", {"arrays__input": [1.0]}, "arrays: expected .* of 3 or 5 states"),
-    ("lqg", {"arrays__output": [[0.0] * 3]}, r"arrays: .*\(1, 3\)"),
-    ("lqg", {"arrays__output": [[2e9] * 3] * 2}, "arrays.output: largest"),
+    ("lqg", {"arrays__input": [1.0]}, r"arrays: expected .*\(1,\)"),
+    ("lqg", {"arrays__kalman": [[2e9] * 2] * 3}, "arrays.kalman: largest"),
     ("lqg", {"arrays__transition": []}, r"arrays: .*\(0, 0\)"),
     (
         "lqg",
@@ -144,7 +143,7 @@ def test_guidance_leads_what_keeps_a_heading(tmp_path):
     )
     with pytest.raises(
         InputError,
-        match="autopilot: expected a controller that keeps a heading, got 'ilos'",
+        match="autopilot: expected a controller that keeps a heading, got Integral",
     ):
         load_agent(nested)
 
