@@ -39,7 +39,7 @@ from shipgym.engine.judging import (
 )
 from shipgym.engine.lane_records import Commands, Random, SeaRandom
 from shipgym.engine.mathematics import pick
-from shipgym.engine.memory import bool_in, float32_in, int64_row_in
+from shipgym.engine.memory import bool_in, float32_in
 from shipgym.engine.motion import HAS_SEA, Motion
 from shipgym.engine.random import BEGIN_WORDS, rng_state, uniform
 from shipgym.engine.records import LANES
@@ -56,23 +56,21 @@ from shipgym.engine.tiles import (
     write_outputs,
 )
 
-SIGNATURE = "int64(float64[::1], float64[::1], int64, int64)"
+SIGNATURE = "int64(float64[::1], float64[::1], int64)"
 STEP, STEP_AND_BEGIN, BEGIN, BEGIN_NEXT = range(4)  # what `run` may be asked for
 REFUSED = -1  # answer of a step to commands that are not finite
 # number of the draw of an episode's ship, apart from those of its task
 SHIP_DRAW = np.uint64(1 << 40)
 
 
-def run(memory: Any, output_memory: Any, share: int, asked: int) -> int:
-    """Take a step of one share of the ships, or begin episodes.
+def run(memory: Any, output_memory: Any, asked: int) -> int:
+    """Take a step of all ships, or begin episodes.
 
     Parameters
     ----------
     memory, output_memory : float64 array
         In which the engine's arrays lie, and those that users are given
         (`shipgym.engine.memory`).
-    share : int
-        Number of the share.
     asked : int
         `STEP`; `STEP_AND_BEGIN`, in which lanes whose episode was over do not stay as
         they are, but begin the next one; `BEGIN` or `BEGIN_NEXT` in the chosen lanes.
@@ -88,7 +86,7 @@ def run(memory: Any, output_memory: Any, share: int, asked: int) -> int:
     chosen = bool_in(memory, at.chosen)
     if asked >= BEGIN:
         for number in range(at.states.rows):
-            tile = tile_of(memory, at, share, number)
+            tile = tile_of(memory, at, number)
             begin_lanes(tile, outputs, chosen, asked == BEGIN_NEXT)
         return 0
 
@@ -96,9 +94,8 @@ def run(memory: Any, output_memory: Any, share: int, asked: int) -> int:
     if not are_finite(actions):
         return REFUSED
     n_ended = 0
-    tiles = int64_row_in(memory, at.shares, share)
-    for number in range(tiles[0], tiles[1]):
-        tile = tile_of(memory, at, share, number)
+    for number in range(at.states.rows):
+        tile = tile_of(memory, at, number)
         rules = load_rules(tile.settings)
         groups = (tile.lanes + GROUP - 1) // GROUP
 
@@ -119,7 +116,7 @@ def run(memory: Any, output_memory: Any, share: int, asked: int) -> int:
 def judge_again(memory: Any, number: int) -> None:
     """Judge the last interval of one tile, and take its events, to see what fails."""
     at = load_arguments(np.frombuffer(memory, dtype=np.int64))
-    tile = tile_of(memory, at, 0, number)
+    tile = tile_of(memory, at, number)
     conclude_lanes(tile, tile.lanes)
     take_events(tile)
 

@@ -37,9 +37,7 @@ class Arguments(NamedTuple):
     pool: Block  # float64 (1, n_pool * n_ship_rows), of which each episode draws one
     settings: Block  # float64 (1, n): of engine and sensor set
     task_settings: Block  # float64 (1, n)
-    results: Block  # float64 (n_shares, n_result_rows * 64): room for those of a tile
-    # int64 (n_shares, 2): first tile of a share, and that behind its last
-    shares: Block
+    results: Block  # float64 (1, n_result_rows * 64): room for those of a tile
     actions: Block  # float32 (n_commands, n_ships)
     chosen: Block  # bool (1, n_ships): lanes in which an episode is to begin
     # int64 (1, n): entries of a tile's results at which the rows of outputs begin

@@ -14,12 +14,10 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from types import GenericAlias
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from shipgym.checks import check_whole
 from shipgym.errors import InputError
 
 LANES = 64
@@ -33,16 +31,6 @@ class Table(NamedTuple):
     array: Any  # the tile or vector in which it lies
     first: int  # entry of its first number
     step: int  # entries from one number to the next
-
-
-@dataclass(frozen=True)
-class Size:
-    """Number of entries of an array, `Annotated[tuple[float, ...], Size(8)]`."""
-
-    entries: int
-
-    def __post_init__(self) -> None:
-        check_whole(self.entries, "Size", at_least=1)
 
 
 class TableField:
@@ -93,23 +81,7 @@ def is_list(kind: Any) -> bool:
 def field_types(record: Record, notes: bool = False) -> dict[str, Any]:
     """Types of a record's fields by name; `notes`: with what `Annotated` adds."""
     names = vars(sys.modules[record.__module__])
-    with_notes = get_type_hints(record, globalns=names, include_extras=True)
-    if notes:
-        return with_notes
-    types = get_type_hints(record, globalns=names)
-    for name, kind in types.items():
-        for note in getattr(with_notes[name], "__metadata__", ()):
-            if isinstance(note, Size):
-                types[name] = _of_size(kind, note.entries)
-    return types
-
-
-def _of_size(kind: Any, entries: int) -> Any:
-    """Return tuple[float, float] for tuple[float, ...]; other kinds as they are."""
-    arguments = get_args(kind)
-    if get_origin(kind) is not tuple or arguments[1:] != (Ellipsis,):
-        return kind
-    return GenericAlias(tuple, arguments[:1] * entries)
+    return get_type_hints(record, globalns=names, include_extras=notes)
 
 
 def members(kind: Any) -> list[tuple[str, Any]]:

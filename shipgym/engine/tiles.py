@@ -55,12 +55,12 @@ class OutputTables(NamedTuple):
     n_ships: int
 
 
-def tile_of(memory: Any, at: Arguments, share: int, number: int) -> Tile:
-    """Return one tile, with the room of a share for its results."""
+def tile_of(memory: Any, at: Arguments, number: int) -> Tile:
+    """Return one tile, with the room for its results."""
     first = number * LANES
     return Tile(
         state=row_in(memory, at.states, number),
-        result=row_in(memory, at.results, share),
+        result=row_in(memory, at.results, 0),
         random=uint64_row_in(memory, at.random, number),
         ships=row_in(memory, at.ships, number % at.ships.rows),
         pool=row_in(memory, at.pool, 0),

@@ -179,7 +179,7 @@ class Engine(Lanes):
         if anew:
             self.renew_outputs()
         asked = STEP_AND_BEGIN if begin_ended else STEP
-        n_ended: int = self._run(self._memory, self.outputs.memory, 0, asked)
+        n_ended: int = self._run(self._memory, self.outputs.memory, asked)
         if n_ended < 0:  # `REFUSED`
             self.outputs = before
             self._refuse_orders()
@@ -201,7 +201,7 @@ class Engine(Lanes):
         The step returns the number of episodes that ended, or
         `shipgym.engine.episodes.REFUSED`.
         """
-        return partial(self._run, self._memory, self.outputs.memory, 0, STEP)
+        return partial(self._run, self._memory, self.outputs.memory, STEP)
 
     def reset(self, seeds: ArrayLike) -> Observation:
         """Begin in each lane the episode of the single environment's `reset(seed=...)`.
@@ -246,7 +246,7 @@ class Engine(Lanes):
 
     def _begin(self, chosen: Flags, asked: int) -> None:
         self._chosen[:] = chosen
-        self._run(self._memory, self.outputs.memory, 0, asked)
+        self._run(self._memory, self.outputs.memory, asked)
 
     def order(self, actions: ArrayLike) -> None:
         """Set the commands for the next step, which refuses non-finite ones.

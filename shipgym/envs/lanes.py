@@ -68,7 +68,6 @@ class Lanes:
         tables = self._allocate(
             **self._filled_tables(contents, n_tiles),
             settings=np.array([self._settings(contents.cut_off)]),
-            shares=np.array([[0, n_tiles]]),
             **self._empty_tables(n_tiles),
             **self._output_rows(),
         )

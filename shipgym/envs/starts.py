@@ -114,7 +114,7 @@ def judge_start(
 ) -> bool:
     """Store what task and instruments make of a start; whether it is one."""
     at = load_arguments(np.frombuffer(memory, dtype=np.int64))
-    tile = tile_of(memory, at, 0, number // LANES)
+    tile = tile_of(memory, at, number // LANES)
     lane = number % LANES
     clear_lane(tile.result, lane)
     ship = load_ship(tile.ships, lane)
