@@ -130,8 +130,10 @@ def read_model(value: Any) -> dict[str, str]:
     table = check_table(value, "model", names)
     texts = {}
     for name in names:
-        text = table.get(name)
-        texts[f"model_{name}"] = check_text(text, f"model.{name}")
+        texts[f"model_{name}"] = check_text(
+            table.get(name),
+            f"model.{name}",
+        )
     return texts
 
 

@@ -98,18 +98,12 @@ class Fitting:
 
     def check_fits_model(self, model: ShipModel) -> None:
         """Refuse a ship of another length, service speed or rudder limit."""
+        names, own = self.observation_names, self.observation_scales
         scales = observation_scales(model).tolist()
-        shown = dict(zip(OBSERVATION_NAMES, scales, strict=True))
-        own = dict(zip(self.observation_names, self.observation_scales, strict=True))
-        both = [name for name in own if name in shown]
-        where = f"model '{model.name}'"
-        check_scales(
-            both,
-            scales=[shown[name] for name in both],
-            own=[own[name] for name in both],
-            where=where,
-            remedy=self.remedy,
-        )
+        shown = dict(zip(names, own, strict=True))
+        shown |= dict(zip(OBSERVATION_NAMES, scales, strict=True))
+        found = [shown[name] for name in names]
+        check_scales(names, found, own, f"model '{model.name}'", self.remedy)
 
 
 def check_fits(policy: Any, task: Task, ship: ShipModel, where: str) -> None:

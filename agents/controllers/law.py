@@ -163,7 +163,11 @@ def given_order(
     smooth = memory.smooth + helm.update * (calm - memory.smooth)
     smooth = np.where(has_started, smooth, calm)
     is_small = np.abs(smooth - memory.order) <= helm.band
-    order = np.where(has_started & is_small, memory.order, smooth)
+    order = np.where(
+        has_started & is_small,
+        memory.order,
+        smooth,
+    )
 
     given = clipped(p.neutral_rudder + order, -helm.limit, helm.limit)
     return given, HelmMemory(

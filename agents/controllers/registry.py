@@ -67,10 +67,8 @@ def register_controller(controller: type[C]) -> type[C]:
             f"{where}: {name}: expected a class method 'from_model(model, *, dt=None,"
             " ...)', got none"
         )
-    other = _HOMES.get(kind)
-    if kind in _REGISTERED:
-        other = _home(_REGISTERED[kind])
-    if other not in (None, _home(controller)):
+    other = _HOMES.get(kind) or _home(_REGISTERED.get(kind, controller))
+    if other != _home(controller):
         raise InputError(
             f"{where}: {name}.kind: expected one that is free, got '{kind}', which is"
             f" that of {other}"
@@ -99,8 +97,7 @@ def controller_class(kind: str, where: str = "controller") -> type[Controller]:
     check_choice(kind, controller_kinds(), where)
     if kind in _REGISTERED:
         return _REGISTERED[kind]
-    home = _HOMES[kind]
-    module_name, _, name = home.partition(":")
-    module = import_module(module_name)
-    controller: type[Controller] = getattr(module, name)
+    module, _, name = _HOMES[kind].partition(":")
+    home = import_module(module)
+    controller: type[Controller] = getattr(home, name)
     return controller

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from agents.export.c_syntax import c_name, comment, literal
-from shipgym.engine.records import field_types, is_record
+from agents.export.c_syntax import c_name, comment, free, literal
+from shipgym.engine.records import is_record
 
 
 class Label(NamedTuple):
@@ -144,36 +144,17 @@ class Structures:
         deeper = f"{indent}    "
         lines = []
         labels = self._labels_of(value)
-        for part, label, after in zip(value, labels, self._units(value), strict=True):
+        for part, label in zip(value, labels, strict=True):
             shown = self.initialiser(part, label.name, deeper)
-            lines.append(f"{deeper}.{label.name} = {shown},{after}\n")
+            lines.append(f"{deeper}.{label.name} = {shown},\n")
         inside = "".join(lines) or f"{deeper}0\n"
         return f"{{\n{inside}{indent}}}"
 
-    def _units(self, value: Any) -> list[str]:
-        """Comments behind the members of a constant.
-
-        A record of what is measured, as a row of a matrix, has a coefficient for each
-        of its members, whose unit is another.
-        """
-        record: Any = type(value)
-        notes = [label.after_name for label in self._labels_of(value)]
-        if record in self.labels or not is_record(record):
-            return notes
-        kinds = field_types(record).values()
-        pairs = zip(notes, kinds, strict=True)
-        return ["" if kind is Any else note for note, kind in pairs]
-
     def free_name(self, name: str) -> str:
-        """A name with the prefix that is not taken yet, with a number if need be."""
-        first = f"{self.prefix}_{name}"
-        free = first
-        number = 2
-        while free in self.taken:
-            free = f"{first}{number}"
-            number += 1
-        self.taken.add(free)
-        return free
+        """A name with the prefix that is not taken yet."""
+        made = free(f"{self.prefix}_{name}", self.taken)
+        self.taken.add(made)
+        return made
 
 
 def field_notes(record: Any) -> dict[str, str]:

@@ -101,3 +101,10 @@ def c_name(name: str) -> str:
     if not name.isascii():
         raise InputError(f"name: expected ASCII letters, as C has them, got {name!r}")
     return f"{name}_" if name in KEYWORDS else name
+
+
+def free(name: str, taken: Any) -> str:
+    """A name that is not taken, with underscores if need be."""
+    while name in taken:
+        name += "_"
+    return name

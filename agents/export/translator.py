@@ -27,6 +27,7 @@ from agents.export.c_syntax import (
     OPERATORS,
     TAKEN,
     comment,
+    free,
     literal,
 )
 from shipgym import InputError
@@ -312,7 +313,11 @@ class FunctionWriter:
         if yes is False and no is True:
             return self.applied(np.invert, test)
         kind = self.c.structures.kind_of(yes)
-        made = self.node("%s ? %s : %s", (test, yes, no), kind)
+        made = self.node(
+            "%s ? %s : %s",
+            (test, yes, no),
+            kind,
+        )
         made.sign = "?"
         return made
 
@@ -437,13 +442,6 @@ def same(a: Any, b: Any) -> bool:
     if isinstance(a, tuple) and isinstance(b, tuple):
         return len(a) == len(b) and all(map(same, a, b))
     return a is b
-
-
-def free(name: str, taken: Any) -> str:
-    """A name that is not taken, with underscores if need be."""
-    while name in taken:
-        name += "_"
-    return name
 
 
 def is_variable(node: Node, uses: Counter[int]) -> bool:

@@ -163,7 +163,12 @@ def check_optimiser(optimiser: str | Mapping[str, Any]) -> tuple[str, dict[str, 
     settings = {}
     for key in known:
         if key in table:
-            settings[key] = check_whole(table[key], key, at_least=1, at_most=100_000)
+            settings[key] = check_whole(
+                table[key],
+                key,
+                at_least=1,
+                at_most=100_000,
+            )
     return name, settings
 
 

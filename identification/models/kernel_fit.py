@@ -7,6 +7,7 @@ principal components of the data in feature space.
 """
 
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -19,6 +20,8 @@ from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.linear import Estimators
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.rm_svm import heading_error, most_regularised
+from identification.models.guard import with_coefficients
+from identification.models.methods import fit_all
 from identification.samples.preprocess import smoothed_channels
 from identification.samples.problem import Problem, held_out_rows
 from identification.samples.samples import Samples
@@ -53,16 +56,12 @@ class _Stage(NamedTuple):
         ship = self.blank.particulars
         window = np.mean(self.samples.duration)
         C = float(weight / (ship["length"] * window * ship["speed"] ** 3))
-        return {
-            q: LSSVM(C=C, scale=False, fit_intercept=False).fit(X, y)
-            for q, X, y in self.samples.select(rows).by_equation()
-        }
+        make = partial(LSSVM, C=C, scale=False, fit_intercept=False)
+        return fit_all(make, self.samples.select(rows))
 
     def model(self, estimators: Estimators) -> ShipModel:
         """The ship with what was fitted."""
-        return self.blank.with_accelerations(
-            {q: estimator.coef_ for q, estimator in estimators.items()}
-        )
+        return with_coefficients(self.blank, estimators)
 
 
 def fit_kernel(
@@ -103,7 +102,9 @@ def fit_kernel(
         """Mean error of the simulated headings of trials held out."""
         stage, errors = stages[length], []
         for rows, held in held_out_rows(trials, stage.samples):
-            model = stage.model(stage.fitted(weight, rows)) if weight else stage.blank
+            model = stage.blank
+            if weight:
+                model = stage.model(stage.fitted(weight, rows))
             errors.append(heading_error(model, held))
         return float(np.mean(errors))
 

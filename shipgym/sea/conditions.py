@@ -222,7 +222,8 @@ class Weather:
             return cls(current=current, name=name)
         height, period, knots = SEA_STATES[name]
         wind = Wind(wind_at_10_m(knots), from_deg)
-        return cls(current, wind, Waves(height, period, from_deg), name)
+        waves = Waves(height, period, from_deg)
+        return cls(current, wind, waves, name)
 
     @property
     def calm(self) -> bool:

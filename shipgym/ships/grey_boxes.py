@@ -124,7 +124,7 @@ class GreyBox(Structure):
     @property
     def astern(self) -> bool:
         """True where the reference ship's shaft may turn astern."""
-        return self.ship.turns_astern
+        return self.ship.dynamics.astern
 
     def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
         """Make what is compiled: the reference ship's functions and the terms."""

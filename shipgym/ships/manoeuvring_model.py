@@ -150,11 +150,6 @@ class ManoeuvringModel:
         return self.dynamics.command_names
 
     @property
-    def turns_astern(self) -> bool:
-        """True where the shaft may turn astern."""
-        return self.dynamics.astern
-
-    @property
     def travel_time(self) -> float:
         """Time to travel one ship length at service speed, s."""
         return float(self.particulars["length"] / self.particulars["speed"])
@@ -354,7 +349,7 @@ def check_units(
     if "n" in names:
         service = model.service_shaft_speed
         most = fastest_shaft * service
-        least = -most if model.turns_astern else 0.0
+        least = -most if model.dynamics.astern else 0.0
         _check_within(
             orders[:, names.index("n")],
             least,

@@ -98,6 +98,7 @@ def standard_form(
         "N_rr": 0.0,
     }
     c = beyond | dict(model_coefficients)
+    # the mean of both sides, and half their difference
     c["C_2"] = 0.5 * (c["C_2_starboard"] + c["C_2_port"])
     c["C_2_side"] = 0.5 * (c["C_2_starboard"] - c["C_2_port"])
     c["gamma_R"] = 0.5 * (c["gamma_plus"] + c["gamma_minus"])

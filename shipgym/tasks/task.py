@@ -359,7 +359,7 @@ class Task:
 
     def least_shaft(self, model: ShipModel) -> float:
         """Least command of the shaft, part of service speed; 0 if it stays ahead."""
-        return -1.0 if model.turns_astern else 0.0
+        return -1.0 if model.dynamics.astern else 0.0
 
     @cached_property
     def info_names(self) -> tuple[str, ...]:
