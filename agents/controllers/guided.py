@@ -98,8 +98,8 @@ class Guided(Controller):
     gain_names: ClassVar[tuple[str, ...]] = ("lookahead", "task_lookahead")
     #: What its law reads of `PathSignals` beside the heading error.
     reads: ClassVar[tuple[str, ...]] = ("cross_track",)
-    has_autopilot: ClassVar[bool] = True
-    settings_type: ClassVar[type[Settings]] = GuidanceSettings
+    has_autopilot = True
+    settings_type = GuidanceSettings
     leads: ClassVar[type[Controller]] = Controller
     bounds: ClassVar[Mapping[str, Bounds]] = {
         **Controller.bounds,

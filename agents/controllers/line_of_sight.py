@@ -7,16 +7,15 @@ IEEE Conference on Decision and Control.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from agents.controllers.controller import Controller
 from agents.controllers.guided import GuidanceSettings, Guided
 from agents.controllers.law import Number, PathSignals
-from agents.settings import Settings, Step, setting
+from agents.settings import Step, setting
 from shipgym import ShipModel
-from shipgym.engine.records import Record
 from shipgym.tasks.task import Task
 
 # integral time over lookahead time with which s^2 + s / T + 1 / (T Ti) has a double
@@ -91,11 +90,11 @@ class IntegralLineOfSight(Guided):
     The error goes to 0 in a steady current.
     """
 
-    kind: ClassVar[str] = "ilos"
-    settings_type: ClassVar[type[Settings]] = LineOfSightSettings
-    law: ClassVar[Any] = staticmethod(integral_line_of_sight)
-    memory_record: ClassVar[Record] = DriftMemory
-    gain_names: ClassVar[tuple[str, ...]] = (*Guided.gain_names, "integral")
+    kind = "ilos"
+    settings_type = LineOfSightSettings
+    law = staticmethod(integral_line_of_sight)
+    memory_record = DriftMemory
+    gain_names = (*Guided.gain_names, "integral")
 
     @cached_property
     def parameters(self) -> LineOfSightGains:

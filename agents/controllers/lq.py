@@ -27,7 +27,7 @@ from agents.controllers.linear_loop import (
     rate_weight,
     sample_ship,
 )
-from agents.settings import Settings, Step, setting
+from agents.settings import Step, setting
 from shipgym import ShipModel
 from shipgym.arrays import Floats
 from shipgym.engine.compiling import tell_who_waits
@@ -105,8 +105,8 @@ class LQ(Controller):
     filtered where it is asked for.
     """
 
-    kind: ClassVar[str] = "lq"
-    settings_type: ClassVar[type[Settings]] = LQSettings
+    kind = "lq"
+    settings_type = LQSettings
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = {
         signal: (signal, 1.0) for signal in SIGNALS
     }

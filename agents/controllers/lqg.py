@@ -28,7 +28,7 @@ from agents.controllers.linear_loop import checked_interval, sample_ship
 from agents.controllers.lq import LQ, SteeringCost
 from agents.controllers.margins import check_stable
 from agents.controllers.memory import from_columns
-from agents.settings import Settings, Step, setting
+from agents.settings import Step, setting
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
 from shipgym.engine.records import Record
@@ -186,12 +186,12 @@ class LQG(Controller):
         the measurement.
     """
 
-    kind: ClassVar[str] = "lqg"
-    settings_type: ClassVar[type[Settings]] = LQGSettings
-    feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
-    law: ClassVar[Any] = staticmethod(lqg_law)
-    memory_record: ClassVar[Record] = LQGMemory
-    reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "surge")
+    kind = "lqg"
+    settings_type = LQGSettings
+    feedback = LQ.feedback
+    law = staticmethod(lqg_law)
+    memory_record = LQGMemory
+    reads = ("yaw_rate", "surge")
     arrays: ClassVar[Mapping[str, int]] = {"transition": 2, "input": 1, "kalman": 2}
     bounds: ClassVar[Mapping[str, Bounds]] = {
         **Controller.bounds,

@@ -19,7 +19,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from agents.controllers.controller import ANY_NUMBER, POSITIVE, Bounds, Controller
+from agents.controllers.controller import ANY_NUMBER, POSITIVE, Bounds
 from agents.controllers.guided import bend
 from agents.controllers.law import (
     HelmMemory,
@@ -33,10 +33,10 @@ from agents.controllers.law import (
 from agents.controllers.lq import LQ
 from agents.controllers.memory import selected
 from agents.controllers.wheel_over import WheelOver, WheelOverSettings
-from agents.settings import Settings, Step, setting
+from agents.settings import Step, setting
 from shipgym import ShipModel
 from shipgym.arrays import Floats
-from shipgym.engine.records import Record, table_of
+from shipgym.engine.records import table_of
 from shipgym.envs.engine import Engine
 from shipgym.tasks.scales import STEPS_PER_LENGTH
 from shipgym.tasks.steering import HEADING_SCALE
@@ -100,12 +100,12 @@ class MPCSettings(WheelOverSettings):
 class MPC(WheelOver):
     """Wheel-over whose course is improved by sampling on the design model `ship`."""
 
-    kind: ClassVar[str] = "mpc"
-    settings_type: ClassVar[type[Settings]] = MPCSettings
-    has_ship: ClassVar[bool] = True
-    memory_record: ClassVar[Record] = PlanMemory
-    leads: ClassVar[type[Controller]] = LQ
-    reads: ClassVar[tuple[str, ...]] = (*WheelOver.reads, "yaw_rate", "rudder")
+    kind = "mpc"
+    settings_type = MPCSettings
+    has_ship = True
+    memory_record = PlanMemory
+    leads = LQ
+    reads = (*WheelOver.reads, "yaw_rate", "rudder")
     bounds: ClassVar[Mapping[str, Bounds]] = {
         **WheelOver.bounds,
         "horizon_steps": Bounds(1, 1000),

@@ -24,7 +24,7 @@ from agents.controllers.linear_loop import (
     sample_ship,
     small_motions,
 )
-from agents.settings import Settings, Step, setting
+from agents.settings import Step, setting
 from shipgym import ShipModel
 from shipgym.instruments.noise import SEA_TRIAL
 from shipgym.models.by_name import takes_name
@@ -100,8 +100,8 @@ class PID(Controller):
     derivative * yaw rate.
     """
 
-    kind: ClassVar[str] = "pid"
-    settings_type: ClassVar[type[Settings]] = PIDSettings
+    kind = "pid"
+    settings_type = PIDSettings
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = {
         "proportional": ("heading_error", 1.0),
         "integral": ("heading_error_integral", 1.0),

@@ -43,9 +43,8 @@ from agents.controllers.seen_current import (
     way_through_water,
 )
 from agents.controllers.wheel_over import own_lead
-from agents.settings import Settings, Step, setting
+from agents.settings import Step, setting
 from shipgym import InputError, ShipModel
-from shipgym.engine.records import Record
 from shipgym.tasks.task import Task
 
 
@@ -357,14 +356,14 @@ class PreviewLQ(Guided):
     half a lead ahead to one and a half.
     """
 
-    kind: ClassVar[str] = "preview-lq"
-    settings_type: ClassVar[type[Settings]] = PreviewSettings
-    law: ClassVar[Any] = staticmethod(preview_law)
-    memory_record: ClassVar[Record] = PreviewMemory
-    leads: ClassVar[type[Controller]] = LQ
-    observes: ClassVar[tuple[str, ...]] = (*Guided.observes, *COURSE_ERROR, *TURNS)
-    may_observe: ClassVar[tuple[str, ...]] = ("roll", "roll_rate")
-    reads: ClassVar[tuple[str, ...]] = (
+    kind = "preview-lq"
+    settings_type = PreviewSettings
+    law = staticmethod(preview_law)
+    memory_record = PreviewMemory
+    leads = LQ
+    observes = (*Guided.observes, *COURSE_ERROR, *TURNS)
+    may_observe = ("roll", "roll_rate")
+    reads = (
         "cross_track",
         "drift",
         "sway",
@@ -372,7 +371,7 @@ class PreviewLQ(Guided):
         "yaw_rate",
         *TURNS,
     )
-    gain_names: ClassVar[tuple[str, ...]] = (
+    gain_names = (
         "task_lookahead",
         *PreviewGains._fields,
     )

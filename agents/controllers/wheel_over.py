@@ -31,7 +31,7 @@ from agents.controllers.law import (
 )
 from agents.controllers.linear_loop import small_motions
 from agents.controllers.lq import LQ
-from agents.settings import Settings, Step, setting
+from agents.settings import Step, setting
 from shipgym import ShipModel
 from shipgym.tasks.task import Task
 
@@ -101,10 +101,10 @@ class WheelOverSettings(GuidanceSettings):
 class WheelOver(Guided):
     """Line of sight that begins turns where the ship needs to, against currents too."""
 
-    kind: ClassVar[str] = "wheel-over"
-    settings_type: ClassVar[type[Settings]] = WheelOverSettings
-    law: ClassVar[Any] = staticmethod(wheel_over_law)
-    observes: ClassVar[tuple[str, ...]] = (*Guided.observes, *COURSE_ERROR, *TURNS)
+    kind = "wheel-over"
+    settings_type = WheelOverSettings
+    law = staticmethod(wheel_over_law)
+    observes = (*Guided.observes, *COURSE_ERROR, *TURNS)
     reads: ClassVar[tuple[str, ...]] = (
         "cross_track",
         "drift",
@@ -112,7 +112,7 @@ class WheelOver(Guided):
         "surge",
         *TURNS,
     )
-    gain_names: ClassVar[tuple[str, ...]] = (
+    gain_names = (
         *Guided.gain_names,
         "turn_reach",
         "crab_share",

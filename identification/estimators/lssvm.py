@@ -133,7 +133,7 @@ class LSSVM(LinearRegressor):
         Number of features.
     """
 
-    name: ClassVar[str] = "ls-svm"
+    name = "ls-svm"
     options: ClassVar[tuple[str, ...]] = ("C", "scale")
 
     C: float = 1e6
@@ -205,7 +205,7 @@ class TruncatedLSSVM(LSSVM):
         For each dropped direction its features.
     """
 
-    name: ClassVar[str] = "tls-svm"
+    name = "tls-svm"
     options: ClassVar[tuple[str, ...]] = ("C", "rank", "selection", "scale")
 
     C: float = np.inf
@@ -244,9 +244,9 @@ class LeastSquares(TruncatedLSSVM):
         Scales that tell rounding from what the data determine, as of `LSSVM`.
     """
 
-    name: ClassVar[str] = "ls"
-    options: ClassVar[tuple[str, ...]] = ("scale",)
-    regularised: ClassVar[bool] = False
+    name = "ls"
+    options = ("scale",)
+    regularised = False
 
     selection: str = "full"
 
@@ -263,8 +263,8 @@ class RidgeRegression(LSSVM):
         As of `LSSVM`.
     """
 
-    name: ClassVar[str] = "ridge"
-    options: ClassVar[tuple[str, ...]] = ("alpha", "scale")
+    name = "ridge"
+    options = ("alpha", "scale")
 
     scale: bool | ArrayLike = False
     alpha: float = 1e-6

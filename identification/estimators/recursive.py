@@ -176,7 +176,7 @@ class Recursion(LinearRegressor):
         Divisors of the regressors inside.
     """
 
-    regularised: ClassVar[bool] = False
+    regularised = False
 
     forgetting: float = 1.0
     C: float = 1e6
@@ -287,7 +287,7 @@ class RecursiveLeastSquares(Recursion):
     Its parameters are those of `Recursion`.
     """
 
-    name: ClassVar[str] = "rls"
+    name = "rls"
     options: ClassVar[tuple[str, ...]] = OPTIONS
 
     def _advance(self, phi: Floats, y: Floats, start: _Start, history: Floats) -> None:
@@ -323,7 +323,7 @@ class MultiInnovationLeastSquares(RecursiveLeastSquares):
         same numbers, or with the matrix of innovations solved (MILS).
     """
 
-    options: ClassVar[tuple[str, ...]] = (
+    options = (
         *OPTIONS,
         "innovations",
         "omega",
@@ -357,7 +357,7 @@ class StochasticGradient(Recursion):
         Slope of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear.
     """
 
-    options: ClassVar[tuple[str, ...]] = (*OPTIONS, "omega")
+    options = (*OPTIONS, "omega")
 
     omega: float = 0.0
 

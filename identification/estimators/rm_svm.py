@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -96,8 +96,8 @@ class RMSVM(LinearRegressor):
         Number of features.
     """
 
-    name: ClassVar[str] = "rm-svm"
-    options: ClassVar[tuple[str, ...]] = ("C", "epsilon", "folds")
+    name = "rm-svm"
+    options = ("C", "epsilon", "folds")
 
     C: float | None = None
     epsilon: float | None = None

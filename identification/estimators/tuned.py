@@ -3,7 +3,7 @@
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -274,7 +274,7 @@ class TunedLSSVM(LinearRegressor):
         For the provenance.
     """
 
-    options: ClassVar[tuple[str, ...]] = (
+    options = (
         "optimiser",
         "objective",
         "bounds",

@@ -7,7 +7,7 @@ published, for the 7 m model and the full-scale ship.
 """
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +25,7 @@ YAW_GYRADIUS = 0.25  # by length
 class KVLCC2Equations(ShipEquations):
     """The standard method, its coefficients as published, the scale among them."""
 
-    scales: ClassVar[bool] = False
+    scales = False
 
     @property
     def coefficients(self) -> dict[str, float]:

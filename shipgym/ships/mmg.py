@@ -12,7 +12,7 @@ at any scale.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import copysign, fabs, pi, sqrt
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -314,7 +314,7 @@ def rudder_force(motion: Motion, c: Any, flow: Flow) -> tuple[float, float, floa
 class MMGEquations(ShipEquations):
     """General form: non-dimensional coefficients, dimensions from the particulars."""
 
-    scales: ClassVar[bool] = True
+    scales = True
 
     @property
     def coefficients(self) -> dict[str, float]:

@@ -18,7 +18,7 @@ equation 38, the matrix of equation 42 and Table 2 have v |r|, and equation 41 r
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -63,7 +63,7 @@ class SharedStructure(Structure):
     texts: Mapping[str, str] = field(default_factory=dict)
     # its added masses are among the unknowns, which only measured forces tell from the
     # mass
-    captive: ClassVar[bool] = True
+    captive = True
 
     @cached_property
     def shares(self) -> dict[str, tuple[Share, ...]]:
