@@ -58,7 +58,7 @@ PLAIN = (
     "neutral_sway",
     "design",
 )
-UNKNOWN_MARGINS = Margins(np.nan, np.nan, np.nan, np.nan, np.nan)
+UNKNOWN_MARGINS = Margins(np.nan, np.nan, np.nan, np.nan)
 
 
 class Bounds(NamedTuple):
@@ -418,7 +418,7 @@ class Controller(Fitting):
         return np.column_stack([order, rows[:, remembered]])
 
     def margins_on(self, model: ShipModel) -> Margins:
-        """Margins and bandwidth of the same controller on another ship.
+        """Margins of the same controller on another ship.
 
         Raises InputError if the closed loop is unstable, or the model has no straight
         course.

@@ -1,4 +1,4 @@
-"""Margins and bandwidth of the loop of a linear controller around a sampled ship."""
+"""Margins of the loop of a linear controller around a sampled ship."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.controllers.linear_loop import ERROR, INTEGRAL, SIGNALS, SampledShip
+from agents.controllers.linear_loop import INTEGRAL, SIGNALS, SampledShip
 from shipgym import InputError
 from shipgym.arrays import Floats
 
@@ -31,8 +31,6 @@ class Margins:
         Phase that may be lost, degrees.
     delay_margin_s : float
         Delay that may be added, s.
-    bandwidth_rad_s : float
-        Of the heading following its set-point, to -3 dB, rad/s.
     lowest_gain : float
         Factor down to which the gain of the order may be lowered; 0 where there is no
         limit. The integral, and a ship unstable on its course, need some.
@@ -41,20 +39,12 @@ class Margins:
     gain_margin: float
     phase_margin_deg: float
     delay_margin_s: float
-    bandwidth_rad_s: float
     lowest_gain: float = 0.0
 
     @property
     def is_enough(self) -> bool:
         """True for 6 dB and 30 degrees."""
         return self.gain_margin >= 2.0 and self.phase_margin_deg >= 30.0
-
-
-class Responses(NamedTuple):
-    """Frequency responses of a loop."""
-
-    broken: dict[str, Complexes]  # each of shape (n_frequencies,), by place of break
-    following: Complexes  # from set-point to heading
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,10 +93,8 @@ class Compensator:
         """
         self._check_closed_loop(ship, name)
         omega = frequencies_of(ship)
-        response = self.responses(ship, omega)
-        breaks = {
-            place: crossings(omega, broken) for place, broken in response.broken.items()
-        }
+        broken = self.responses(ship, omega)
+        breaks = {place: crossings(omega, one) for place, one in broken.items()}
         phases = np.concatenate([one.phases_deg for one in breaks.values()])
         delays = np.concatenate([one.delays_s for one in breaks.values()])
         gains = np.concatenate([one.gains for one in breaks.values()])
@@ -115,7 +103,6 @@ class Compensator:
             gain_margin=least(gains[gains > 1.0]),
             phase_margin_deg=least(np.abs(phases)),
             delay_margin_s=least(delays),
-            bandwidth_rad_s=bandwidth(omega, np.abs(response.following)),
             lowest_gain=float(np.max(at_order[at_order < 1.0], initial=0.0)),
         )
 
@@ -131,8 +118,11 @@ class Compensator:
                 " from_model"
             )
 
-    def responses(self, ship: SampledShip, omega: Floats) -> Responses:
-        """Frequency responses at frequencies in rad/s, shape (n_frequencies,)."""
+    def responses(self, ship: SampledShip, omega: Floats) -> dict[str, Complexes]:
+        """Frequency responses of the broken loop, by the place where it is broken.
+
+        At frequencies in rad/s, shape (n_frequencies,) as each of them.
+        """
         z = np.exp(1j * omega * ship.dt)
         motions = _transfer(ship.A, ship.B, z)[:, :, 0].T
         of_memory = self.C @ _transfer(self.A, self.B, z)
@@ -146,10 +136,7 @@ class Compensator:
         for signal, own in fed_back.items():
             if own.any():
                 broken[signal] = -own / (1.0 - (whole - own))
-        integral = ship.dt / (z - 1.0)  # of the set-point
-        set_point = orders[ERROR] + orders[INTEGRAL] * integral
-        following = -motions[ERROR] * set_point / (1.0 - whole)
-        return Responses(broken, following)
+        return broken
 
 
 def frequencies_of(ship: SampledShip) -> Floats:
@@ -215,25 +202,6 @@ def check_stable(matrix: Floats, where: str) -> None:
     pole = largest_pole(matrix)
     if not pole < 1.0:
         raise InputError(f"{where}: expected sampled poles below 1, got {pole:.4g}")
-
-
-def bandwidth(omega: Floats, size: Floats) -> float:
-    """Frequency at which a response first falls to -3 dB; the last one if it does not.
-
-    `omega`: rad/s, rising; `size`: of the response there, both of shape (n,). Between
-    two frequencies it is straight over their logarithm.
-    """
-    half_power = np.sqrt(0.5)
-    below = np.flatnonzero(size < half_power)
-    if len(below) == 0:
-        return float(omega[-1])
-    first = below[0]
-    last_above = max(first - 1, 0)
-    around = [first, last_above]
-    logarithms = np.log(omega[around])
-    sizes = size[around]
-    found = np.interp(half_power, sizes, logarithms)
-    return float(np.exp(found))
 
 
 def _transfer(A: Floats, B: Floats, z: Complexes) -> Complexes:

@@ -22,7 +22,6 @@ MARGINS = {
     "lowest_gain": ("gain margin, downwards", "factor"),
     "phase_margin_deg": ("phase margin", "deg"),
     "delay_margin_s": ("delay margin", "s"),
-    "bandwidth_rad_s": ("bandwidth", "rad/s"),
 }
 
 

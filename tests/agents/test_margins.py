@@ -49,7 +49,7 @@ def pole(controller, ship, place, factor=1.0, delay=0):
 
 def breaks(controller, ship):
     omega = frequencies_of(ship)
-    broken = controller.loop().responses(ship, omega).broken
+    broken = controller.loop().responses(ship, omega)
     return {place: crossings(omega, one) for place, one in broken.items()}
 
 
