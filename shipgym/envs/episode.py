@@ -34,17 +34,16 @@ from shipgym.trials.clock_texts import DAY
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
 
-FORMAT = 2
+FORMAT = 3
 KIND = "episode"
-SERIES = ("states", "commands", "reward_parts", "info")
 
 
 @dataclass(frozen=True, eq=False)
 class Episode:
     """Record of one episode, immutable, SI units and the project's signs.
 
-    States and info are those at the beginning and after each of the n steps; commands,
-    actions and rewards belong to the steps.
+    States and info are those at the beginning and after each of the n steps; actions
+    and rewards belong to the steps.
 
     Raises InputError naming the field.
 
@@ -62,11 +61,6 @@ class Episode:
         As the agent gave them.
     rewards : array-like of shape (n_steps,)
         Sum of the parts.
-    commands : mapping of str to array-like of shape (n_steps,), optional
-        What was ordered in each step, ``delta`` in rad and ``n`` in 1/s, where that is
-        known.
-    reward_parts : mapping of str to array-like of shape (n_steps,), optional
-        Parts of the rewards, as `info` names them.
     info : mapping of str to array-like of shape (n_steps + 1,), optional
         What else `info` reported in numbers, at the beginning and after each step; true
         is 1.
@@ -96,8 +90,6 @@ class Episode:
     states: Mapping[str, Floats]
     actions: Floats
     rewards: Floats
-    commands: Mapping[str, Floats] = field(default_factory=dict)
-    reward_parts: Mapping[str, Floats] = field(default_factory=dict)
     info: Mapping[str, Floats] = field(default_factory=dict)
     waypoints: Floats | None = None
     corridor: float | None = None
@@ -144,11 +136,10 @@ class Episode:
         actions = check_finite(self.actions, "actions")
         shape = (n_steps, *(actions.shape[1:] or (1,)))
         self._set("actions", _series(actions, "actions", shape[:2]))
-        for group in SERIES:
-            count = n_steps + 1 if group in ("states", "info") else n_steps
+        for group in ("states", "info"):
             arrays = {}
             for name, values in check_table(getattr(self, group), group).items():
-                arrays[name] = _series(values, f"{group}.{name}", (count,))
+                arrays[name] = _series(values, f"{group}.{name}", (n_steps + 1,))
             self._set(group, arrays)
         needed = ("x", "y", "psi", "delta")
         if not self.states.keys() >= set(needed):
@@ -178,21 +169,20 @@ class Episode:
         """Return the episode as a trial to identify from.
 
         By default it is named by environment, seed and number. It has the states that
-        are channels of trials, the orders `delta_command` and `n_command` constant from
-        each sample on (the last one to the last sample too), and `n` of a shaft that
-        turns as ordered. `use` is "fit", "validate" or "skip". Raises InputError for an
-        episode of a single step, which is too short for a trial.
+        are channels of trials, orders from the sample on at which they begin to hold
+        (the last one to the last sample too), and `n` of a shaft that turns as ordered.
+        `use` is "fit", "validate" or "skip". Raises InputError for an episode of a
+        single step, which is too short for a trial.
         """
         channels = {}
         for key, values in self.states.items():
-            if key in CHANNELS:
+            if key.endswith("_command"):
+                channels[key] = np.append(values[1:], values[-1])
+            elif key in CHANNELS:
                 channels[key] = values
         channels["psi"] = np.unwrap(channels["psi"])
-        for key, values in self.commands.items():
-            orders = np.append(values, values[-1])
-            channels[f"{key}_command"] = orders
-            if key == "n":
-                channels.setdefault("n", orders)
+        if "n_command" in channels:
+            channels.setdefault("n", channels["n_command"])
 
         if name is None:
             name = f"{self.environment} seed {self.seed} episode {self.number}"

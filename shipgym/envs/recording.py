@@ -18,8 +18,6 @@ from shipgym.models import ShipModel
 Observation = TypeVar("Observation")
 Action = TypeVar("Action")
 
-REWARD = "reward_"  # prefix of the names of the parts of the reward in info
-
 
 class RecordEpisode(
     gymnasium.Wrapper[Observation, Action, Observation, Action],
@@ -119,9 +117,6 @@ class RecordEpisode(
         ship, spec = self._ship, self.env.spec
         model: ShipModel = ship.model
         seed = ship.np_random_seed
-        states, numbers = _columns(self._states), _columns(self._infos)
-        parts = [name for name in numbers if name.startswith(REWARD)]
-        orders = {name: states[f"{name}_command"] for name in model.command_names}
         success = self._infos[-1].get("success")
         return Episode(
             environment=spec.id if spec else type(ship).__name__,
@@ -137,12 +132,10 @@ class RecordEpisode(
             waypoints=ship.waypoints,
             turn_radius=ship.turn_radius,
             corridor=ship.corridor,
-            states=states,
+            states=_columns(self._states),
             actions=np.array(self._actions),
             rewards=np.array(self._rewards),
-            commands={name: values[1:] for name, values in orders.items()},
-            reward_parts={name: numbers.pop(name)[1:] for name in parts},
-            info=numbers,
+            info=_columns(self._infos),
             terminated=self._ends[0],
             truncated=self._ends[1],
             success=None if success is None else bool(success),

@@ -26,6 +26,7 @@ def episode(**changes):
         "v": np.zeros_like(t),
         "r": np.full_like(t, 0.002),
         "delta": rudder,
+        "delta_command": np.append(0.0, rudder[1:]),
         "set_point": np.full_like(t, 0.1),
         "wind_speed": np.full_like(t, 8.0),
         "wind_from": np.full_like(t, np.pi / 2),
@@ -43,11 +44,6 @@ def episode(**changes):
         "states": states,
         "actions": np.zeros((STEPS, 1)),
         "rewards": np.full(STEPS, -0.5),
-        "commands": {"delta": rudder[1:]},
-        "reward_parts": {
-            "reward_cross_track": np.full(STEPS, -0.4),
-            "reward_rudder": np.full(STEPS, -0.1),
-        },
         "info": {
             "cross_track": np.full_like(t, 20.0),
             "extrapolating": np.zeros_like(t),
@@ -132,8 +128,6 @@ def test_the_ship_moves_through_the_frames_to_its_end(shown):
     known = episode()
     page = shown(
         states={name: values[:3] for name, values in known.states.items()},
-        commands={},
-        reward_parts={},
         info={},
         rewards=known.rewards[:2],
         actions=known.actions[:2],
@@ -192,7 +186,7 @@ def test_the_command_writes_the_page(recorded):
         ('{"name": "mariner", "format": 1}', "kind: expected 'episode', got None"),
         (
             '{"kind": "episode", "format": 9}',
-            "expected format 2, which this version of shipgym reads, got 9",
+            "expected format 3, which this version of shipgym reads, got 9",
         ),
     ],
 )

@@ -27,11 +27,12 @@ EPISODE = Episode(
     length=160.93,
     beam=23.17,
     rudder_limit=0.7,
-    states=states(set_point=np.zeros(STEPS + 1)),
-    commands={"delta": np.array([0.1, -0.1, 0.2, 0.3])},
+    states=states(
+        set_point=np.zeros(STEPS + 1),
+        delta_command=np.array([0.0, 0.1, -0.1, 0.2, 0.3]),
+    ),
     actions=np.array([[0.1], [-0.1], [0.2], [0.3]]),
     rewards=-np.ones(STEPS),
-    reward_parts={"reward_heading": -np.ones(STEPS)},
     info={"cross_track": np.linspace(0.0, 1.0, STEPS + 1)},
     waypoints=np.array([[0.0, 0.0], [1000.0, 1.0 / 3.0]]),
     corridor=60.0,
@@ -47,7 +48,7 @@ EPISODE = Episode(
 def test_what_is_read_is_what_was_written_to_the_last_digit(tmp_path):
     EPISODE.save(tmp_path / "episode.json")
     read = Episode.load(tmp_path / "episode.json")
-    for name in ("states", "commands", "reward_parts", "info"):
+    for name in ("states", "info"):
         written, found = getattr(EPISODE, name), getattr(read, name)
         assert list(written) == list(found)
         assert all(np.array_equal(written[key], found[key]) for key in written)
@@ -75,9 +76,11 @@ def test_the_heading_of_a_trial_goes_through_south_without_a_jump():
 
 
 def test_a_shaft_that_turns_as_ordered_is_part_of_the_trial():
-    episode = replace(EPISODE, commands={"n": np.full(STEPS, 1.5)})
+    turning = states(n_command=np.full(STEPS + 1, 1.5))
+    episode = replace(EPISODE, states=turning)
     assert episode.to_trial()["n"].tolist() == [1.5] * (STEPS + 1)
-    lagging = replace(episode, states=states(n=np.linspace(0.0, 1.0, STEPS + 1)))
+    turning["n"] = np.linspace(0.0, 1.0, STEPS + 1)
+    lagging = replace(EPISODE, states=turning)
     assert lagging.to_trial()["n"][0] == 0.0
 
 
@@ -89,7 +92,7 @@ def test_an_episode_cannot_be_changed():
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [
-        ("format", 1, "expected format 2, which this version of shipgym reads, got 1"),
+        ("format", 1, "expected format 3, which this version of shipgym reads, got 1"),
         ("kind", "model", "kind: expected 'episode', got 'model'"),
         ("dt", 0, "dt: expected a number > 0"),
         ("seed", -1, "seed: expected an integer of at least 0"),
@@ -98,7 +101,7 @@ def test_an_episode_cannot_be_changed():
         ("waypoints", [[0.0, 0.0]], "waypoints: expected at least 2 rows"),
         ("states", {"x": [0.0, 1.0]}, "states.x: expected shape (5,), got (2,)"),
         ("states", {"x": [0.0] * 5}, "states: expected 'x', 'y', 'psi', 'delta'"),
-        ("commands", {"delta": 0.1}, "commands.delta: expected shape (4,), got ()"),
+        ("info", {"cost": 0.1}, "info.cost: expected shape (5,), got ()"),
         ("rewards", [], "rewards: expected at least one step, got none"),
         ("success", "yes", "success: expected a boolean"),
         ("turn_radius", 4e4, "waypoints"),
@@ -153,7 +156,7 @@ def test_what_need_not_be_known_may_be_left_out():
     unknown = dict.fromkeys(
         ("waypoints", "corridor", "turn_radius", "beam", "seed", "success")
     )
-    bare = replace(EPISODE, **unknown, commands={})
+    bare = replace(EPISODE, **unknown, states=states())
     assert (bare.n_steps, bare.number, bare.rudder_limit) == (STEPS, 3, 0.7)
     assert replace(bare, rudder_limit=np.pi / 2.0, beam=160.93, number=0).number == 0
     assert "delta_command" not in bare.to_trial()

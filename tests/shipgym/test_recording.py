@@ -85,8 +85,9 @@ def test_rewards_parts_and_orders_are_those_of_the_environment(tmp_path):
     episode = Episode.load(tmp_path / "episode-00000.json")
     assert episode.rewards.tolist() == rewards
     costs = episode.info["cost"][1:]
-    assert sum(episode.reward_parts.values()) == pytest.approx(-costs, abs=1e-12)
-    assert episode.commands["delta"] == pytest.approx(
+    parts = [episode.info[name][1:] for name in env.unwrapped.task.reward_parts]
+    assert sum(parts) == pytest.approx(-costs, abs=1e-12)
+    assert episode.states["delta_command"][1:] == pytest.approx(
         episode.actions[:, 0] * np.radians(40.0)
     )
     assert episode.info.keys() >= {"heading_error", "extrapolating"}
