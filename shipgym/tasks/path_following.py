@@ -361,15 +361,14 @@ def on_event(
     """Go on to the leg on which the ship is now."""
     radius = settings.turn_radius * ship.length
     leg = state.leg
-    along_track = state.distance_made_good
-    for _ in range(len(plan) // 2):
-        if turn_is_over(leg, along_track, radius):
-            leg = leg_after(leg, radius, plan)
-            along_track = fix(motion.x, motion.y, leg, ship, settings).along_track
-
     at = fix(motion.x, motion.y, leg, ship, settings)
+    for _ in range(len(plan) // 2):
+        if turn_is_over(leg, at.along_track, radius):
+            leg = leg_after(leg, radius, plan)
+            at = fix(motion.x, motion.y, leg, ship, settings)
+
     error = wrap(at.course - motion.psi)
-    return gone_on(state, leg, at.course, error, at.cross_track, along_track)
+    return gone_on(state, leg, at.course, error, at.cross_track, at.along_track)
 
 
 def step(
@@ -390,6 +389,7 @@ def step(
     error = wrap(at.course - motion.psi)
     integral = integrated(state.integral, error, interval, ship, settings.weights)
     activity, reversed_now = activity_after(motion, state, settings)
+    minutes = max(interval.steps, 1.0) * interval.dt / 60.0
     travel = fabs(motion.delta - interval.rudder_before)
     after = State(
         leg=leg,
@@ -403,14 +403,13 @@ def step(
         grounded=pick(aground, 1.0, 0.0),
         rudder_activity=activity,
         rudder_travel=state.rudder_travel + travel,
-        reversals_per_minute=activity.reversals / minutes_of(interval),
+        reversals_per_minute=activity.reversals / minutes,
         corridor=max(off / settings.corridor - 1.0, 0.0),
         heel=heel_excess(motion, settings.weights),
     )
-    made_now = after.distance_made_good - state.distance_made_good
     reward = Reward(
         cross_track=cross_track_reward(off, settings),
-        progress=progress_reward(made_now, interval, ship),
+        progress=progress_reward(after, state, interval, ship),
         rudder_travel=rudder_travel_reward(travel, settings),
         reversals=-settings.reversal_weight * reversed_now,
         steering=steering_reward(motion, interval, ship, settings.weights),
@@ -440,19 +439,20 @@ def made_good(at: Fix, leg: Leg) -> float:
     return pick(is_last, min(at.along_track, leg.turn_at), at.along_track)
 
 
-def minutes_of(interval: Interval) -> float:
-    """Minutes since the start, of one interval at least."""
-    return max(interval.steps, 1.0) * interval.dt / 60.0
-
-
 def cross_track_reward(off: float, settings: Settings) -> float:
     """Cost of a distance from the path, in ship lengths, with the sign turned."""
     by_corridor = off * (1.0 / settings.corridor)
     return -by_corridor * by_corridor
 
 
-def progress_reward(made_now: float, interval: Interval, ship: Ship) -> float:
-    """Cost of the shortfall in progress along the path in an interval, m."""
+def progress_reward(
+    after: State,
+    before: State,
+    interval: Interval,
+    ship: Ship,
+) -> float:
+    """Cost of the shortfall in progress along the path in an interval."""
+    made_now = after.distance_made_good - before.distance_made_good
     progress = made_now * (1.0 / interval.dt)
     return clip(progress / ship.scale_speed, 1.0 - WORST_PROGRESS, 1.0) - 1.0
 

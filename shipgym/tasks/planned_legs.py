@@ -41,13 +41,6 @@ class Fix(NamedTuple):
     turned: float  # rad, of the next turn, without its sign
 
 
-class OnLeg(NamedTuple):
-    """Position from the first waypoint of a leg."""
-
-    ahead: float  # m, along the leg
-    aside: float  # m, to starboard of it
-
-
 class OnArc(NamedTuple):
     """Position on the arc of a turn."""
 
@@ -55,51 +48,25 @@ class OnArc(NamedTuple):
     cross_track: float  # m, to starboard
 
 
-class Waypoint(NamedTuple):
-    """Point of a plan."""
-
-    north: float  # m
-    east: float  # m
-
-
-class Course(NamedTuple):
-    """Straight line from one waypoint to another."""
-
-    length: float  # m
-    direction: float  # rad
-
-
-def waypoint(number: int, plan: Numbers) -> Waypoint:
-    """Return a waypoint of a plan."""
-    north = plan[2 * number]
-    east = plan[2 * number + 1]
-    return Waypoint(north, east)
-
-
 def last_waypoint(plan: Numbers) -> int:
     """Number of the last waypoint of a plan."""
     return len(plan) // 2 - 1
 
 
-def between(number: int, other: int, plan: Numbers) -> Course:
-    """Length and direction from a waypoint to another."""
-    start = waypoint(number, plan)
-    end = waypoint(other, plan)
-    north = end.north - start.north
-    east = end.east - start.east
-    return Course(
-        length=sqrt(north * north + east * east),
-        direction=arctan2(east, north),
-    )
+def between(number: int, other: int, plan: Numbers) -> tuple[float, float]:
+    """Length, m, and direction, rad, from a waypoint to another."""
+    north = plan[2 * other] - plan[2 * number]
+    east = plan[2 * other + 1] - plan[2 * number + 1]
+    return sqrt(north * north + east * east), arctan2(east, north)
 
 
 def change_of_course(number: int, plan: Numbers) -> float:
     """Change of course at a waypoint, rad; 0 at the first and the last."""
     if number == 0 or number >= last_waypoint(plan):
         return 0.0
-    before = between(number - 1, number, plan)
-    after = between(number, number + 1, plan)
-    return wrap(after.direction - before.direction)
+    _, before = between(number - 1, number, plan)
+    _, after = between(number, number + 1, plan)
+    return wrap(after - before)
 
 
 def next_turn(number: int, plan: Numbers) -> int:
@@ -107,8 +74,7 @@ def next_turn(number: int, plan: Numbers) -> int:
     last = last_waypoint(plan)
     number = min(number + 1, last)
     while number < last:
-        turn = change_of_course(number, plan)
-        if fabs(turn) >= NO_TURN:
+        if fabs(change_of_course(number, plan)) >= NO_TURN:
             break
         number += 1
     return number
@@ -128,22 +94,21 @@ def leg_from(number: int, along_track: float, radius: float, plan: Numbers) -> L
     taken = tangent(turn, radius)
     taken_by_second = tangent(second_turn, radius)
 
-    start = waypoint(number, plan)
-    leg = between(number, first, plan)
+    length, course = between(number, first, plan)
     begins = along_track - tangent(change_of_course(number, plan), radius)
-    turn_at = begins + leg.length - taken
-    next_leg = between(first, second, plan)
-    straight = next_leg.length - taken - taken_by_second
+    turn_at = begins + length - taken
+    next_length, _ = between(first, second, plan)
+    straight = next_length - taken - taken_by_second
     second_at = turn_at + radius * fabs(turn) + straight
 
-    sine, cosine = sin_cos(leg.direction)
+    sine, cosine = sin_cos(course)
     return Leg(
         number=float(number),
-        north=start.north,
-        east=start.east,
+        north=plan[2 * number],
+        east=plan[2 * number + 1],
         cosine=cosine,
         sine=sine,
-        course=leg.direction,
+        course=course,
         begins=begins,
         turn_at=turn_at,
         turn=turn,
@@ -163,15 +128,19 @@ def fix(x: float, y: float, leg: Leg, ship: Ship, settings: Any) -> Fix:
     """
     radius = settings.turn_radius * ship.length
     lookahead = settings.lookahead * ship.length
-    here = on_leg(x, y, leg)
-    past = here.ahead - (leg.turn_at - leg.begins)
-    arc = on_arc(past, here.aside, leg, radius)
+    # along the leg and across
+    north = x - leg.north
+    east = y - leg.east
+    ahead = north * leg.cosine + east * leg.sine
+    aside = east * leg.cosine - north * leg.sine
+    past = ahead - (leg.turn_at - leg.begins)
+    arc = on_arc(past, aside, leg, radius)
 
     is_turning = (past > 0.0) & (leg.turn != 0.0)
-    straight_on = leg.begins + here.ahead
+    straight_on = leg.begins + ahead
     round_turn = leg.turn_at + radius * arc.turned
     along_track = pick(is_turning, round_turn, straight_on)
-    cross_track = pick(is_turning, arc.cross_track, here.aside)
+    cross_track = pick(is_turning, arc.cross_track, aside)
 
     half_ahead = along_track + 0.5 * lookahead
     first = part_of(leg.turn, half_ahead - leg.turn_at, radius)
@@ -182,18 +151,6 @@ def fix(x: float, y: float, leg: Leg, ship: Ship, settings: Any) -> Fix:
         cross_track=cross_track,
         course=leg.course + first + (second - back),
         turned=pick(is_turning, arc.turned, 0.0),
-    )
-
-
-def on_leg(x: float, y: float, leg: Leg) -> OnLeg:
-    """Position from the first waypoint of a leg, along it and across."""
-    north = x - leg.north
-    east = y - leg.east
-    ahead = north * leg.cosine + east * leg.sine
-    aside = east * leg.cosine - north * leg.sine
-    return OnLeg(
-        ahead=ahead,
-        aside=aside,
     )
 
 
