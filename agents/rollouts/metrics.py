@@ -33,11 +33,6 @@ def worst_step_cost(task: Task) -> float:
     return float(asked(task.definition.worst_cost, task.settings))
 
 
-def _on_path(task: Task) -> bool:
-    path_info = ("cross_track", "in_corridor", "success")
-    return set(path_info) <= set(task.info_names)
-
-
 def metrics(run: Rollout) -> dict[str, Floats]:
     """Figures of each episode by name.
 
@@ -55,7 +50,7 @@ def metrics(run: Rollout) -> dict[str, Floats]:
     """
     nowhere = np.full(len(run.costs), np.nan)
     followed = dict.fromkeys(("cross_track_rmse_m", "outside_corridor"), nowhere)
-    if _on_path(run.task):
+    if {"cross_track", "in_corridor"} <= run.histories.keys():
         followed = path_following(run)
     success = succeeded(run)
     failed = success == 0.0

@@ -9,6 +9,7 @@ import numpy as np
 
 from agents.output import check_page
 from shipgym import Episode, InputError, Trial
+from shipgym.envs.rendering import hull_outline
 from shipgym.files import write_text
 from shipgym.pages import render
 from shipgym.plots import Panel, line, line_styles, panels
@@ -17,10 +18,6 @@ from shipgym.plots.trials import history_panel, path_panel
 from shipgym.tasks.guidance import wrapped
 
 FRAMES = 200  # places of the slider
-#: Hull from the bow to starboard and round, in parts of length and beam.
-OUTLINE = np.array(
-    [(0.5, 0.0), (0.2, 0.5), (-0.5, 0.4), (-0.5, -0.4), (0.2, -0.5), (0.5, 0.0)]
-)
 #: Channels in the order of the page; what no episode has is left out.
 CHANNELS = ("psi", "delta", "delta_command", "u", "r", "phi", "n", "wind_speed")
 
@@ -71,14 +68,16 @@ def _chart(runs: Mapping[str, Episode], trials: Mapping[str, Trial]) -> Figure:
     styles = line_styles(runs)
     for name, run in runs.items():
         hull = _hull(run, 0.0)
-        bow = {"size": [8, 0, 0, 0, 0, 0]}  # where the ship is too small to be seen
-        drawn: dict[str, Any] = {
+        size = [0] * len(hull["x"])
+        size[0] = 8  # the bow, where the ship is too small to be seen
+        ship: dict[str, Any] = {
+            **line(hull["x"], hull["y"], name, **styles[name]),
             "mode": "lines+markers",
-            "marker": bow,
+            "marker": {"size": size},
             "fill": "toself",
+            "showlegend": False,
         }
-        ship = line(hull["x"], hull["y"], name, **styles[name], **drawn)
-        panel.traces.append({**ship, "fill": "toself", "showlegend": False})
+        panel.traces.append(ship)
 
     figure = panels([panel], 620, hovermode="closest")
     end = max(trial.duration for trial in trials.values())
@@ -109,22 +108,13 @@ def _with_slider(figure: Figure, times: Sequence[str]) -> Figure:
 
 def _hull(episode: Episode, time: float) -> dict[str, list[float]]:
     """Outline of a ship at a time, x east and y north; at its end it stays."""
-    t = episode.t
     states = episode.states
-    turned = np.unwrap(states["psi"])
-    heading = np.interp(time, t, turned)
-    north = np.interp(time, t, states["x"])
-    east = np.interp(time, t, states["y"])
-    slender = episode.length / 6.5  # a beam that is not known
-    size = np.array([episode.length, episode.beam or slender])
-    outline = size * OUTLINE
-    sine = np.sin(heading)
-    cosine = np.cos(heading)
-    to_north = outline @ [cosine, -sine]
-    to_east = outline @ [sine, cosine]
-    x = np.round(east + to_east, 2)
-    y = np.round(north + to_north, 2)
-    return {"x": x.tolist(), "y": y.tolist()}
+    t = episode.t
+    place = [np.interp(time, t, states[name]) for name in ("x", "y")]
+    heading = float(np.interp(time, t, np.unwrap(states["psi"])))
+    outline = hull_outline(place, heading, episode.length, episode.beam)
+    north, east = np.round(outline, 2).T
+    return {"x": east.tolist(), "y": north.tolist()}
 
 
 def _histories(runs: Mapping[str, Episode], trials: Mapping[str, Trial]) -> Figure:

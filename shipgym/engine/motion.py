@@ -80,11 +80,17 @@ Rates = Motion
 NO_RATES: Rates = zeros(Rates)()
 
 
+#: In surge, sway, yaw and roll, and of the memory of yaw.
+Accelerations = tuple[float, float, float, float, float]
+#: Three numbers, as of surge, sway and yaw.
+Triple = tuple[float, float, float]
+
+
 def accelerations(
     motion: Motion,
     coefficients: Any,
     ship: Ship,
-) -> tuple[float, float, float, float, float]:
+) -> Accelerations:
     """Accelerations in surge, sway, yaw, roll and of the memory of yaw.
 
     A hook, replaced by the ship's own function.

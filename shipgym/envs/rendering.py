@@ -5,7 +5,7 @@ from math import cos, degrees, hypot, sin
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from shipgym.arrays import Floats
 from shipgym.envs.engine import Engine
@@ -29,7 +29,7 @@ CORRIDOR = (222, 236, 224)
 
 #: Outline of a ship from above: forward and to starboard, in lengths and beams.
 OUTLINE = np.array([[0.5, 0.0], [0.38, 0.36], [0.2, 0.5], [-0.42, 0.5], [-0.5, 0.36]])
-HULL_OUTLINE = np.vstack([OUTLINE, OUTLINE[:0:-1] * [1.0, -1.0]])
+HULL_OUTLINE = np.vstack([OUTLINE, OUTLINE[::-1] * [1.0, -1.0]])
 
 
 class Artist:
@@ -134,18 +134,18 @@ def _direction(angle: float) -> Floats:
     return np.array([cos(angle), sin(angle)])
 
 
-def _hull(
-    x: float,
-    y: float,
+def hull_outline(
+    place: ArrayLike,
     heading: float,
     length: float,
     beam: float | None,
 ) -> Floats:
-    """Outline of a ship, m north and east, shape (n, 2)."""
+    """Outline of a ship from the bow round, m north and east, shape (n, 2)."""
     ahead = _direction(heading)
     starboard = [-ahead[1], ahead[0]]
     size = [length, beam or USUAL_BEAM * length]
-    outline: Floats = (HULL_OUTLINE * size) @ np.array([ahead, starboard]) + [x, y]
+    axes = np.array([ahead, starboard])
+    outline: Floats = (HULL_OUTLINE * size) @ axes + np.asarray(place)
     return outline
 
 
@@ -171,7 +171,8 @@ def _draw_shape(chart: _Chart, shape: Shape) -> None:
         radius = shape.radius / chart.metres
         chart.circle(shape.colour, (shape.x, shape.y), radius, width)
     elif isinstance(shape, ShipOutline):
-        hull = _hull(shape.x, shape.y, shape.psi, shape.length, shape.beam)
+        place = (shape.x, shape.y)
+        hull = hull_outline(place, shape.psi, shape.length, shape.beam)
         chart.polygon(shape.colour, hull)
 
 
@@ -192,7 +193,7 @@ def _draw_ship(
     stern = centre - 0.5 * length * ahead
     blade = stern - 0.22 * length * _direction(state["psi"] - state["delta"])
     chart.line("danger", [stern, blade], 3 * FINER)
-    chart.polygon(HULL, _hull(state["x"], state["y"], state["psi"], length, beam))
+    chart.polygon(HULL, hull_outline(centre, state["psi"], length, beam))
 
 
 def _readouts(engine: Engine, lane: int, state: dict[str, float]) -> dict[str, str]:

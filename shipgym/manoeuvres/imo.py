@@ -92,22 +92,15 @@ def imo_criteria(
         trial = trial_in_words(model, rule.manoeuvre)
         criteria[criterion] = Criterion(rule, trial, tuple(sides))
     stop = found.get(STOPPING.manoeuvre)
-    criteria["stopping"] = stopping_criterion(model, stop)
+    criteria["stopping"] = stopping_criterion(stop)
     measured = measured_in_file(model)
     return with_measured(criteria, measured)
 
 
-def stopping_criterion(
-    model: ShipModel, stop: Mapping[str, IndexInterval] | None
-) -> Criterion:
+def stopping_criterion(stop: Mapping[str, IndexInterval] | None) -> Criterion:
     """Full astern stopping test; no verdict for a ship that cannot go astern."""
     if stop is not None:
         side = Side(name="", drawn=stop[STOPPING.index])
         return Criterion(STOPPING, STOPPING.manoeuvre, (side,))
-    why = "its equations hold for a shaft turning ahead only"
-    if "n" not in model.command_names:
-        why = (
-            "its thrust is inside its surge coefficients, so it cannot be ordered"
-            " astern"
-        )
-    return Criterion(STOPPING, remark=f"not assessable: {why}")
+    remark = "not assessable: its equations hold for a shaft turning ahead only"
+    return Criterion(STOPPING, remark=remark)

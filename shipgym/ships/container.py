@@ -10,7 +10,7 @@ from math import copysign, fabs, pi, sqrt
 from typing import Any, NamedTuple
 
 from shipgym.engine.mathematics import small_sin_cos
-from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.motion import Accelerations, Motion, Ship, Triple
 from shipgym.ships.equations import ShipEquations, published
 from shipgym.ships.term_functions import letter_sum
 
@@ -43,9 +43,7 @@ roll_moment = letter_sum("K", TERMS)
 yaw_moment = letter_sum("N", TERMS)
 
 
-def accelerations(
-    motion: Motion, c: Any, ship: Ship
-) -> tuple[float, float, float, float, float]:
+def accelerations(motion: Motion, c: Any, ship: Ship) -> Accelerations:
     """Accelerations in surge, sway, yaw and roll, body frame, origin midship."""
     L = LENGTH
     U = sqrt(motion.u * motion.u + motion.v * motion.v)
@@ -97,9 +95,7 @@ def accelerations(
     return udot * linear, vdot * linear, rdot * angular, pdot * angular, 0.0
 
 
-def coupled_accelerations(
-    Y: float, K: float, N: float, c: Any
-) -> tuple[float, float, float]:
+def coupled_accelerations(Y: float, K: float, N: float, c: Any) -> Triple:
     """Solve the equations of motion in sway, roll and yaw, prime system."""
     # [m + m_y      -m_y l_y    m_y alpha_y] [vdot]   [Y]
     # [-m_y l_y     I_x + J_x   0          ] [pdot] = [K]
@@ -117,9 +113,7 @@ def coupled_accelerations(
     return vdot, pdot, rdot
 
 
-def propeller(
-    nD: float, u: float, v: float, r: float, c: Any
-) -> tuple[float, float, float]:
+def propeller(nD: float, u: float, v: float, r: float, c: Any) -> Triple:
     """Inflow u_P of the propeller, its thrust by (n D)^2, and its thrust T."""
     # u_P = u ((1 - w_P) + tau ((v + x_P r)^2 + c_Pv v + c_Pr r))
     v_P = v + c.xp * r
@@ -134,7 +128,7 @@ def propeller(
 
 def rudder_force(
     delta: float, v: float, r: float, u_P: float, K_T_nn: float, c: Any
-) -> tuple[float, float, float]:
+) -> Triple:
     """Normal force F_N of the rudder, and its angle's sine and cosine.
 
     F_N is negative to starboard.

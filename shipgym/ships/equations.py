@@ -21,7 +21,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_text, placed, unexpected
 from shipgym.engine.compiled_ship import CompiledShip, compiled_ship
-from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.motion import Accelerations, Motion, Ship
 from shipgym.engine.records import Record, field_types, is_record
 from shipgym.errors import InputError
 from shipgym.python_files import (
@@ -36,7 +36,7 @@ from shipgym.ships.reference_ships import published_ships
 from shipgym.ships.steering import SteeringGear
 
 ACCELERATIONS = ("udot", "vdot", "rdot", "pdot", "qdot")
-Accelerations = Callable[[Any, Any, Any], tuple[float, float, float, float, float]]
+Equations = Callable[[Any, Any, Any], Accelerations]
 
 
 def record_of(values: Mapping[str, float], module: str) -> Any:
@@ -72,7 +72,7 @@ class ShipEquations:
     # from (motion, coefficients, ship), see `Motion` and `Ship` of
     # `shipgym.engine.motion`, to udot, vdot in m/s^2, rdot, pdot in rad/s^2, and the
     # rate of the memory of yaw, 0 as a rule; body frame, origin midship
-    accelerations: Accelerations
+    accelerations: Equations
     particulars: Particulars  # with length and service speed
     steering: SteeringGear
     _: KW_ONLY

@@ -17,7 +17,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import check_flag
 from shipgym.engine.compiled_ship import CompiledShip, compiled_ship
-from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.motion import Accelerations, Motion, Ship
 from shipgym.engine.record_code import changer
 from shipgym.engine.records import Record
 from shipgym.errors import InputError
@@ -201,9 +201,7 @@ def term_accelerations(motion: Motion, c: Any, ship: Ship) -> Any:
     """Hook: the sum of the terms."""
 
 
-def accelerations(
-    motion: Motion, c: Any, ship: Ship
-) -> tuple[float, float, float, float, float]:
+def accelerations(motion: Motion, c: Any, ship: Ship) -> Accelerations:
     """The reference ship's at the converted state, converted back, and the terms."""
     fast = c.known.speed / ship.speed
     quick = fast * ship.length / c.known.length

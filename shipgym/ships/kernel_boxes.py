@@ -23,7 +23,7 @@ from shipgym.engine import stages
 from shipgym.engine.compiled_ship import CompiledShip
 from shipgym.engine.lane_records import Point, Sums
 from shipgym.engine.mathematics import two_to
-from shipgym.engine.motion import Motion, Ship, accelerations
+from shipgym.engine.motion import Accelerations, Motion, Ship, Triple, accelerations
 from shipgym.engine.records import Record, row_of, table_of
 from shipgym.errors import InputError
 from shipgym.ships.grey_boxes import GreyBox
@@ -296,9 +296,7 @@ def add_centre(at: Point, sums: Sums, c: KernelCoefficients, number: int) -> Sum
     )
 
 
-def sum_accelerations(
-    motion: Motion, sums: Sums, ship: Ship
-) -> tuple[float, float, float]:
+def sum_accelerations(motion: Motion, sums: Sums, ship: Ship) -> Triple:
     """Surge, sway and yaw acceleration of the sums, by U^2."""
     UU = motion.u * motion.u + motion.v * motion.v
     return UU * sums.u, UU * sums.v, UU * sums.r
@@ -306,7 +304,7 @@ def sum_accelerations(
 
 def kernel_accelerations(
     motion: Motion, c: KernelCoefficients, ship: Ship
-) -> tuple[float, float, float, float, float]:
+) -> Accelerations:
     """Accelerations that the kernel adds to those of one ship."""
     at = coordinates(motion, c, ship)
     sums = Sums(0.0, 0.0, 0.0)

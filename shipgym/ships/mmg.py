@@ -18,7 +18,7 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.engine.mathematics import arctan2, exponential, small_sin_cos
-from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.motion import Accelerations, Motion, Ship, Triple
 from shipgym.engine.record_code import polynomial
 from shipgym.ships.equations import ShipEquations, record_of
 from shipgym.ships.particulars import Particulars
@@ -153,7 +153,7 @@ class Mass(NamedTuple):
 
 def planar_accelerations(
     motion: Motion, X: float, Y: float, N: float, mass: Mass
-) -> tuple[float, float, float]:
+) -> Triple:
     """Accelerations in surge, sway and yaw by forces.
 
     (m + m_x) udot - (m + m_y) v r - x_G m r^2 = X
@@ -197,9 +197,7 @@ def power_law(x: float, power: float) -> float:
     return exponential(power * 16.0 * z * artanh_series(z * z))
 
 
-def accelerations(
-    motion: Motion, c: Any, ship: Ship
-) -> tuple[float, float, float, float, float]:
+def accelerations(motion: Motion, c: Any, ship: Ship) -> Accelerations:
     """Accelerations in surge, sway and yaw, body frame, origin midship."""
     L = ship.length
     flow = flow_of(motion, c, ship)
@@ -268,7 +266,7 @@ sway_force = letter_sum("Y", HIGHER)
 yaw_moment = letter_sum("N", HIGHER)
 
 
-def hull_forces(c: Any, flow: Flow, ship: Ship) -> tuple[float, float, float]:
+def hull_forces(c: Any, flow: Flow, ship: Ship) -> Triple:
     """Forces X_H, Y_H and moment N_H of the hull, polynomials in v' and r'."""
     r = flow.r
     slowed = power_law(flow.U / ship.speed, c.speed_power)
@@ -286,7 +284,7 @@ def hull_forces(c: Any, flow: Flow, ship: Ship) -> tuple[float, float, float]:
     return q * X, q * Y, q * ship.length * N
 
 
-def rudder_force(motion: Motion, c: Any, flow: Flow) -> tuple[float, float, float]:
+def rudder_force(motion: Motion, c: Any, flow: Flow) -> Triple:
     """Normal force F_N of the rudder, and sine and cosine of its angle."""
     # v_R = U gamma_R beta_R
     beta_R = flow.beta - c.l_R * flow.r

@@ -10,7 +10,7 @@ from math import copysign, fabs
 from typing import Any
 
 from shipgym.engine.mathematics import arctan2
-from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.motion import Accelerations, Motion, Ship
 from shipgym.ships.equations import ShipEquations, published
 
 LENGTH = 304.8  # m
@@ -22,9 +22,7 @@ PUBLISHED = published("tanker", __name__)
 Coefficients = PUBLISHED["coefficients_record"]
 
 
-def accelerations(
-    motion: Motion, c: Any, ship: Ship
-) -> tuple[float, float, float, float, float]:
+def accelerations(motion: Motion, c: Any, ship: Ship) -> Accelerations:
     """Accelerations in surge, sway and yaw, body frame, origin midship."""
     L = LENGTH
     u, v, r, n = motion.u, motion.v, motion.r, motion.n

@@ -139,7 +139,7 @@ def test_the_ship_moves_through_the_frames_to_its_end(shown):
         (hull,) = frame["data"]
         bow = 20.0 + 50.0 * np.sin(heading), north + 50.0 * np.cos(heading)
         assert (hull["x"][0], hull["y"][0]) == pytest.approx(bow, abs=0.01)
-    assert frames[0]["data"][0]["x"][1] == 30.0  # half a beam to starboard
+    assert frames[0]["data"][0]["x"][2] == 30.0  # half a beam to starboard
 
 
 def test_no_name_breaks_the_page(tmp_path):
