@@ -325,16 +325,13 @@ def with_path(task: Task | None) -> Task:
 
 def _scales_of(task: Task, model: ShipModel, names: Sequence[str]) -> tuple[float, ...]:
     """Scales of observations of a task; InputError for one that it does not show."""
-    scales = {}
-    for quantity in task.observed(model):
-        scales[quantity.name] = quantity.scale
+    scales = {quantity.name: quantity.scale for quantity in task.observed(model)}
     for name in names:
         if name not in scales:
             raise InputError(
                 f"task: expected one that shows '{name}', got '{task.name}'"
             )
-    own = [scales[name] for name in names]
-    return tuple(own)
+    return tuple([scales[name] for name in names])
 
 
 def shown_course(seen: PathSignals, lookahead: float, path_radius: float) -> Number:

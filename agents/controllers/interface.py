@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -141,20 +142,12 @@ def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> No
 
     Raises InputError, which names the first difference.
     """
-    for i, (name, wanted) in enumerate(zip(found, expected, strict=False)):
+    pairs = zip_longest(found, expected, fillvalue="none")
+    for i, (name, wanted) in enumerate(pairs):
         if name != wanted:
             raise InputError(
                 f"{where}: observation {i}: expected '{wanted}', got '{name}'"
             )
-    if len(found) == len(expected):
-        return
-    missing = [name for name in expected if name not in found]
-    unknown = [name for name in found if name not in expected]
-    different = ", ".join(unknown + missing)
-    raise InputError(
-        f"{where}: expected {len(expected)} observations, got {len(found)}; in one"
-        f" and not in the other: {different}"
-    )
 
 
 def check_scales(

@@ -80,9 +80,10 @@ class PIDSettings(HelmSettings):
             # of the optimal regulator, which feeds back the rudder too and can be
             # faster
             frequency_share = 0.85
-            lag = lag_of(model, dt)
+            # up to which the gear's pole, by the sum of the roots, is no slower
+            sum_of_roots = 1.0 / lag_of(model, dt) + 1.0 / response.T
             slow = self.integral_pole(model)
-            largest = largest_frequency(response, lag, damping, slow)
+            largest = (sum_of_roots - slow) / (2.0 * damping + 1.0)
             frequency = min(frequency_share * optimal.frequency, largest)
         noise = logged_noise(model) if self.noise is None else self.noise
         return replace(self, frequency=frequency, damping=damping, noise=noise)
@@ -224,17 +225,6 @@ def optimal_poles(response: Nomoto, rate_weight: float) -> Poles:
     frequency = float(np.sqrt(np.prod(pair).real))
     decay = float(-np.sum(pair).real)
     return Poles(frequency, damping=decay / (2.0 * frequency))
-
-
-def largest_frequency(
-    response: Nomoto, lag: float, damping: float, slow: float
-) -> float:
-    """Frequency of a pair of poles, rad/s, up to which the gear's is no slower.
-
-    For the arguments see `place_poles`.
-    """
-    sum_of_roots = 1.0 / lag + 1.0 / response.T
-    return (sum_of_roots - slow) / (2.0 * damping + 1.0)
 
 
 def place_poles(

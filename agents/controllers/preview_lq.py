@@ -306,7 +306,11 @@ class PreviewSettings(GuidanceSettings):
             reach = 5.0 * own_lead(model, autopilot)
         if share is None:
             share = 0.0 if task.weather.waves is None else 0.5
-        return replace(own, reach_lengths=reach, course_share=share)
+        return replace(
+            own,
+            reach_lengths=reach,
+            course_share=share,
+        )
 
     def gains(self, model: ShipModel, task: Task, autopilot: LQ) -> dict[str, float]:
         """Gains in SI units, around LQ; of whole settings.

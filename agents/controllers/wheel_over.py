@@ -140,31 +140,18 @@ def own_lead(model: ShipModel, autopilot: Controller | None) -> float:
     """
     if not isinstance(autopilot, LQ):
         autopilot = LQ.from_model(model)
-    turn = steady_turn(model)
+    _, steering, by_rudder = small_motions(model)
+    by_sway, by_yaw_rate = steering.T
+    columns = np.column_stack([by_sway, by_rudder])
+    sway, rudder = np.linalg.solve(columns, -by_yaw_rate)  # m and s, per yaw rate
 
     # the order is the angle: the heading error makes what the other gains do not
     gains = autopilot.gains
-    unfed = turn.rudder * (1.0 - gains["rudder"])
-    missing = unfed - gains["yaw_rate"] - gains["sway"] * turn.sway
+    unfed = rudder * (1.0 - gains["rudder"])
+    missing = unfed - gains["yaw_rate"] - gains["sway"] * sway
     heading_lag = missing / gains["heading_error"]  # s
 
-    lag_m = heading_lag * model.particulars["speed"] - turn.sway
+    lag_m = heading_lag * model.particulars["speed"] - sway
     late = 0.25  # measured on the reference ships as they begin to turn, ship lengths
     lead = lag_m / model.particulars["length"] + late
     return float(np.clip(lead, SHORTEST_LEAD, LONGEST_LEAD))
-
-
-class SteadyTurn(NamedTuple):
-    """Steady turn of a linear ship, per yaw rate."""
-
-    sway: float  # m
-    rudder: float  # s
-
-
-def steady_turn(model: ShipModel) -> SteadyTurn:
-    """Solve 0 = A (v, r) + B delta for sway and rudder."""
-    _, steering, rudder = small_motions(model)
-    by_sway, by_yaw_rate = steering.T
-    by_sway_and_rudder = np.column_stack([by_sway, rudder])
-    solution = np.linalg.solve(by_sway_and_rudder, -by_yaw_rate)
-    return SteadyTurn(*solution)

@@ -335,7 +335,12 @@ def check_part(agent: Any) -> None:
     `agent`: a policy, or the ships among which it learns (`ResidualVecEnv`).
     """
     largest_authority = 2.0
-    check_number(agent.authority, "authority", above=0.0, at_most=largest_authority)
+    check_number(
+        agent.authority,
+        "authority",
+        above=0.0,
+        at_most=largest_authority,
+    )
     check_whole(agent.frame_stack, "frame_stack", at_least=1)
     check_whole(agent.action_repeat, "action_repeat", at_least=1)
     check_number(agent.rate_limit, "rate_limit", above=0.0, at_most=NO_LIMIT)

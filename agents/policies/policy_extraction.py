@@ -86,16 +86,13 @@ def _stack(env: Any) -> Iterator[Any]:
 def _check_wrapper(wrapper: Any) -> None:
     """Refuse a wrapper that changes observations or actions."""
     name = type(wrapper).__name__
-    if name == "VecNormalize" and wrapper.norm_obs:
-        raise InputError(
-            "env: expected VecNormalize(norm_obs=False), got one that scales"
-            " observations, which the environments do already"
-        )
+    scales = name == "VecNormalize" and wrapper.norm_obs
     changing = gymnasium.ObservationWrapper | gymnasium.ActionWrapper
-    if name in REFUSED or isinstance(wrapper, changing):
+    if scales or name in REFUSED or isinstance(wrapper, changing):
         raise InputError(
             "env: expected no wrapper that changes observations or actions but"
-            f" ResidualVecEnv, whose frame_stack shows past ones, got {name}"
+            " ResidualVecEnv, whose frame_stack shows past ones, and VecNormalize with"
+            f" norm_obs=False, got {name}"
         )
 
 

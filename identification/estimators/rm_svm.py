@@ -118,7 +118,7 @@ class RMSVM(LinearRegressor):
         features, targets = validated(self, X, y)
         scale = scales_of(column_rms(features), True)
         deviation = root_mean_square(targets) or 1.0
-        weight = self.weight_of_errors
+        weight = 1.0 if self.C is None else self.C
         self.coef_ = np.zeros(features.shape[1])
         if weight != NO_CORRECTION:
             C = weight / len(targets)
@@ -139,11 +139,6 @@ class RMSVM(LinearRegressor):
         """Set that of a ridge regression."""
         moment = features.T @ features + np.diag(penalty)
         self.inverse_moment_ = np.linalg.pinv(moment, hermitian=True)
-
-    @property
-    def weight_of_errors(self) -> float:
-        """The weight of the errors, where none is given 1."""
-        return 1.0 if self.C is None else float(self.C)
 
     @property
     def band(self) -> float:

@@ -15,7 +15,7 @@ from shipgym.engine.compiling import entry_of
 from shipgym.engine.episode_program import EpisodeProgram, episode_program
 from shipgym.engine.episodes import BEGIN, BEGIN_NEXT, STEP, STEP_AND_BEGIN
 from shipgym.engine.records import LANES
-from shipgym.envs.lanes import Contents, Lanes
+from shipgym.envs.lanes import Lanes
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES
 from shipgym.envs.plain_python import fault_of_interval, plain_loop
 from shipgym.envs.randomisation import Randomisation
@@ -101,8 +101,15 @@ class Engine(Lanes):
             len(own) == 1,
             task.checked,
         )
-        contents = Contents(own, drawn, cut_off)
-        super().__init__(program, model, task, num_envs, contents)
+        super().__init__(
+            program,
+            model,
+            task,
+            num_envs,
+            own,
+            drawn,
+            cut_off,
+        )
         self._begin_all(loop or self._compiled)
 
     def _begin_all(self, loop: Callable[[EpisodeProgram], Any]) -> None:

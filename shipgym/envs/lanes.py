@@ -1,7 +1,7 @@
 """State of many ships by lane: layout, reading, writing and copies between steps."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,15 +22,6 @@ from shipgym.tasks.shapes import Shape, shapes_of
 from shipgym.tasks.task import Task
 
 
-class Contents(NamedTuple):
-    """Ships, seas and settings of lanes."""
-
-    # one ship and sea for all lanes or one each, or the pool
-    own: Pool
-    drawn: bool  # whether each episode draws a ship and a sea of a pool
-    cut_off: float  # control intervals after which episodes are truncated
-
-
 class Lanes:
     """The arrays that loops work on; `Engine` steps them.
 
@@ -42,7 +33,12 @@ class Lanes:
         The ship, or the first of them.
     task : Task
     num_envs : int
-    contents : Contents
+    own : Pool
+        One ship and sea for all lanes or one each, or the pool.
+    drawn : bool
+        Whether each episode draws a ship and a sea of the pool.
+    cut_off : float
+        Control intervals after which episodes are truncated.
     """
 
     outputs: Outputs  # of the last step
@@ -53,7 +49,9 @@ class Lanes:
         model: ShipModel,
         task: Task,
         num_envs: int,
-        contents: Contents,
+        own: Pool,
+        drawn: bool,
+        cut_off: float,
     ) -> None:
         self.program = program
         self.model = model
@@ -66,8 +64,8 @@ class Lanes:
 
         n_tiles = -(-num_envs // LANES)
         tables = self._allocate(
-            **self._filled_tables(contents, n_tiles),
-            settings=np.array([self._settings(contents.cut_off)]),
+            **self._filled_tables(own, drawn, n_tiles),
+            settings=np.array([self._settings(cut_off)]),
             **self._empty_tables(n_tiles),
             **self._output_rows(),
         )
@@ -87,9 +85,8 @@ class Lanes:
             n_flags=ANSWER_FLAGS + len(self.flag_names),
         )
 
-    def _filled_tables(self, contents: Contents, n_tiles: int) -> dict[str, Floats]:
+    def _filled_tables(self, own: Pool, drawn: bool, n_tiles: int) -> dict[str, Floats]:
         """Tables of ships, of their pool, and of settings of the task."""
-        own, drawn, _ = contents
         columns = ship_columns(own, self.windy, self.task, self.model, drawn)
         n_ship_rows = columns.shape[1]
         pool = columns if drawn else np.zeros((0, n_ship_rows))
