@@ -25,7 +25,6 @@ from agents.controllers.linear_loop import (
     SIGNALS,
     SampledShip,
     sample_ship,
-    small_motions,
 )
 from agents.controllers.margins import Compensator, Margins
 from agents.controllers.memory import (
@@ -41,7 +40,7 @@ from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats, finite
 from shipgym.engine.records import Record, leaves
 from shipgym.files import write_json
-from shipgym.models.linear import nomoto_of
+from shipgym.models.linear import nomoto
 from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
 
 Action = NDArray[np.float32]
@@ -168,8 +167,7 @@ class Controller(Fitting):
             Further fields of the class.
         """
         scales = observation_scales(model).tolist()
-        motions = small_motions(model)
-        response = nomoto_of(motions.steering, motions.rudder)
+        response = nomoto(model)
         answer = {"nomoto_K": response.K, "nomoto_T": response.T}
         made = cls(
             gains={**HelmSettings().helm(model, ship.dt), **gains},

@@ -11,7 +11,7 @@ from agents.controllers.linear_loop import ERROR, RUDDER, YAW_RATE, sampled
 from shipgym import ShipModel
 from shipgym.arrays import Floats
 from shipgym.instruments.noise import SEA_TRIAL
-from shipgym.models.linear import StraightRunning, linearise
+from shipgym.models.linear import small_motions
 
 MOTIONS = slice(RUDDER)  # sway, yaw rate and heading error
 #: Yaw rate and heading error as they are measured of them.
@@ -26,23 +26,19 @@ class KalmanFilter(NamedTuple):
     process: Floats  # covariance of what disturbs them in an interval, shape (3, 3)
 
 
-def course_filter(
-    model: ShipModel, about: StraightRunning, dt: float, disturbance: float
-) -> KalmanFilter:
+def course_filter(model: ShipModel, dt: float, disturbance: float) -> KalmanFilter:
     """Filter of sway, yaw rate and heading error.
 
     Parameters
     ----------
     model : ShipModel
-    about : StraightRunning
-        The state about which motions are small.
     dt : float
         Between two measurements, s.
     disturbance : float
         By the sea: standard deviation of a rudder angle that would do the same, rad.
     """
-    linear = np.column_stack(linearise(model, about))
-    A, B = sampled(linear, lag=0.0, dt=dt)
+    _, *linear = small_motions(model)
+    A, B = sampled(np.column_stack(linear), lag=0.0, dt=dt)
     effect = B[MOTIONS]
     pushed = disturbance * effect
     # how much the course to steer may move between two measurements, rad

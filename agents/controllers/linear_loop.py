@@ -8,8 +8,6 @@ and rate are not.
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,9 +18,8 @@ from shipgym.checks import check_number
 from shipgym.models.linear import (
     Nomoto,
     StraightRunning,
-    linearise,
-    nomoto_of,
-    straight_running,
+    nomoto,
+    small_motions,
 )
 from shipgym.tasks.scales import RATE_WEIGHT, control_interval
 
@@ -50,28 +47,6 @@ class SampledShip:
     B: Floats
     dt: float
     about: StraightRunning
-
-
-class SmallMotions(NamedTuple):
-    """Linear ship about straight running: d/dt (v, r) = steering (v, r) + rudder delta.
-
-    SI units, deviations.
-    """
-
-    about: StraightRunning
-    steering: Floats  # shape (2, 2)
-    rudder: Floats  # shape (2,)
-
-
-@lru_cache(maxsize=16)
-def small_motions(model: ShipModel) -> SmallMotions:
-    """Linearise a ship about straight running; a search designs on one ship often.
-
-    Raises InputError if she has no straight course.
-    """
-    about = straight_running(model)
-    steering, rudder = linearise(model, about)
-    return SmallMotions(about, steering, rudder)
 
 
 def checked_interval(model: ShipModel, dt: float | None) -> float:
@@ -119,8 +94,7 @@ def sample_ship(model: ShipModel, dt: float, first_order: bool = False) -> Sampl
     about, steering, rudder = small_motions(model)
     linear = np.column_stack([steering, rudder])
     if first_order:
-        form = nomoto_of(steering, rudder)
-        linear = _first_order(form, model.travel_time)
+        linear = _first_order(nomoto(model), model.travel_time)
 
     lag = model.steering.time_constant
     A, B = sampled(linear, lag, dt)

@@ -242,7 +242,7 @@ class LQG(Controller):
         ship = sample_ship(model, interval)
         given: Any = own
         disturbance = float(np.radians(given.disturbance_deg))
-        states = course_filter(model, ship.about, interval, disturbance)
+        states = course_filter(model, interval, disturbance)
         gain, deviations = kalman_gain(states, given.noise)
         new_course = max(NEW_COURSE, GATE * deviations[1])
 

@@ -1,7 +1,7 @@
 """Margins of the loop of a linear controller around a sampled ship."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,18 +87,16 @@ class Compensator:
         return np.delete(without, INTEGRAL, axis=1)
 
     def margins(self, ship: SampledShip, name: str) -> Margins:
-        """Stability margins and bandwidth with a ship, by frequency responses.
+        """Stability margins with a ship, by frequency responses.
 
         `name` is that of the design. Raises InputError if the closed loop is unstable.
         """
         self._check_closed_loop(ship, name)
         omega = frequencies_of(ship)
         broken = self.responses(ship, omega)
-        breaks = {place: crossings(omega, one) for place, one in broken.items()}
-        phases = np.concatenate([one.phases_deg for one in breaks.values()])
-        delays = np.concatenate([one.delays_s for one in breaks.values()])
-        gains = np.concatenate([one.gains for one in breaks.values()])
-        at_order = breaks["order"].gains
+        found = [crossings(omega, one) for one in broken.values()]
+        gains, phases, delays = map(np.concatenate, zip(*found, strict=True))
+        at_order, _, _ = found[0]
         return Margins(
             gain_margin=least(gains[gains > 1.0]),
             phase_margin_deg=least(np.abs(phases)),
@@ -121,7 +119,7 @@ class Compensator:
     def responses(self, ship: SampledShip, omega: Floats) -> dict[str, Complexes]:
         """Frequency responses of the broken loop, by the place where it is broken.
 
-        At frequencies in rad/s, shape (n_frequencies,) as each of them.
+        The first is the order. `omega` in rad/s, shape (n_frequencies,) as each.
         """
         z = np.exp(1j * omega * ship.dt)
         motions = _transfer(ship.A, ship.B, z)[:, :, 0].T
@@ -144,16 +142,10 @@ def frequencies_of(ship: SampledShip) -> Floats:
     return np.geomspace(SLOWEST, 1.0, N_FREQUENCIES) * np.pi / ship.dt
 
 
-class Crossings(NamedTuple):
-    """Where the response of a broken loop passes -1."""
+def crossings(omega: Floats, response: Complexes) -> tuple[Floats, Floats, Floats]:
+    """Gains, phases, deg, and delays, s, with which a broken loop passes -1.
 
-    gains: Floats  # factors with which it would
-    phases_deg: Floats  # by which it would have to be turned
-    delays_s: Floats
-
-
-def crossings(omega: Floats, response: Complexes) -> Crossings:
-    """Crossings of the negative real axis and of the unit circle, on straight lines.
+    By crossings of the negative real axis and of the unit circle, on straight lines.
 
     `omega`: rad/s; `response`: at these frequencies, the last of which is Nyquist's,
     where it is real.
@@ -168,7 +160,7 @@ def crossings(omega: Floats, response: Complexes) -> Crossings:
     growth = omega[place + 1] / omega[place]
     at = omega[place] * growth**share
     delays = np.radians(phases % 360.0) / at
-    return Crossings(-1.0 / real[real < 0.0], phases, delays)
+    return -1.0 / real[real < 0.0], phases, delays
 
 
 def _on_the_axis(response: Complexes) -> Floats:

@@ -7,7 +7,7 @@ from the steering cost).
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -22,13 +22,12 @@ from agents.controllers.linear_loop import (
     checked_interval,
     rate_weight,
     sample_ship,
-    small_motions,
 )
 from agents.settings import Step, setting
 from shipgym import ShipModel
 from shipgym.instruments.noise import SEA_TRIAL
 from shipgym.models.by_name import takes_name
-from shipgym.models.linear import Nomoto, nomoto_of
+from shipgym.models.linear import Nomoto, nomoto
 from shipgym.tasks.scales import RUDDER_WEIGHT
 
 
@@ -73,8 +72,9 @@ class PIDSettings(HelmSettings):
         times its best, 1.2 times in course changes of 5 deg.
         """
         response = nomoto(model)
-        optimal = optimal_poles(response, rate_weight(model))
-        damping = optimal.damping if self.damping is None else self.damping
+        optimal, damping = optimal_poles(response, rate_weight(model))
+        if self.damping is not None:
+            damping = self.damping
         frequency = self.frequency
         if frequency is None:
             # of the optimal regulator, which feeds back the rudder too and can be
@@ -84,7 +84,7 @@ class PIDSettings(HelmSettings):
             sum_of_roots = 1.0 / lag_of(model, dt) + 1.0 / response.T
             slow = self.integral_pole(model)
             largest = (sum_of_roots - slow) / (2.0 * damping + 1.0)
-            frequency = min(frequency_share * optimal.frequency, largest)
+            frequency = min(frequency_share * optimal, largest)
         noise = logged_noise(model) if self.noise is None else self.noise
         return replace(self, frequency=frequency, damping=damping, noise=noise)
 
@@ -150,12 +150,6 @@ class PID(Controller):
         return cls.designed(model, ship, gains, {**known(own), "lag": lag})
 
 
-def nomoto(model: ShipModel) -> Nomoto:
-    """First-order form of a ship about straight running."""
-    motions = small_motions(model)
-    return nomoto_of(motions.steering, motions.rudder)
-
-
 def lag_of(model: ShipModel, dt: float) -> float:
     """Lag of the gear that is made up for, and of the held command, s.
 
@@ -186,15 +180,8 @@ def quiet_update(gains: Mapping[str, float], noise: float, dt: float) -> float:
     return float(np.clip(share, least, 1.0))
 
 
-class Poles(NamedTuple):
-    """A pair of poles."""
-
-    frequency: float  # natural, rad/s
-    damping: float  # ratio
-
-
-def optimal_poles(response: Nomoto, rate_weight: float) -> Poles:
-    """Dominant poles that the steering cost asks for.
+def optimal_poles(response: Nomoto, rate_weight: float) -> tuple[float, float]:
+    """Natural frequency, rad/s, and damping of the poles that the steering cost asks.
 
     They are those of the LQ regulator with weights on heading error, rudder and rudder
     rate (`rate_weight`, s^2), for the first-order Nomoto form with the rudder rate as
@@ -224,7 +211,7 @@ def optimal_poles(response: Nomoto, rate_weight: float) -> Poles:
     # (s - p1) (s - p2) = s^2 + 2 damping frequency s + frequency^2
     frequency = float(np.sqrt(np.prod(pair).real))
     decay = float(-np.sum(pair).real)
-    return Poles(frequency, damping=decay / (2.0 * frequency))
+    return frequency, decay / (2.0 * frequency)
 
 
 def place_poles(

@@ -46,28 +46,21 @@ class Way(NamedTuple):
     aside: Number  # m/s, to starboard
 
 
-class Passed(NamedTuple):
-    """What a ship has passed of the path in an interval."""
-
-    turned: Number  # rad, by which the path has turned beside her
-    speed: Number  # m/s, along the path; 0 where it is not known
-
-
 def seen_current(
     seen: PathSignals, memory: CurrentMemory, p: CurrentScales
 ) -> CurrentMemory:
     """Current by another interval."""
-    passed = passed_path(seen, memory, p)
+    turned, speed = passed_path(seen, memory, p)
     water = way_through_water(seen)
-    carried = turned_back(Way(memory.ahead, memory.aside), passed.turned)
+    carried = turned_back(Way(memory.ahead, memory.aside), turned)
 
     over_ground = wrapped(seen.drift - seen.heading_error)  # against the path
     most_across = 1.2  # rad: beyond, the speed along the path says little
     is_along = np.abs(over_ground) < most_across
-    is_likely = (passed.speed > p.slowest) & (passed.speed < p.fastest)
+    is_likely = (speed > p.slowest) & (speed < p.fastest)
     is_seen = is_along & is_likely
 
-    ahead = np.where(is_seen, passed.speed, water.ahead + carried.ahead)
+    ahead = np.where(is_seen, speed, water.ahead + carried.ahead)
     slope = np.tan(np.where(is_along, over_ground, 0.0))
     aside = np.where(is_along, ahead * slope - water.aside, carried.aside)
     is_first = is_seen & (memory.is_known == 0.0)
@@ -77,7 +70,7 @@ def seen_current(
     return CurrentMemory(
         ahead=carried.ahead + update * (seen_ahead - carried.ahead),
         aside=carried.aside + update * (seen_aside - carried.aside),
-        turned=passed.turned,
+        turned=turned,
         is_known=np.where(is_seen, 1.0, memory.is_known),
         distance=seen.turns.next_distance,
         angle=seen.turns.next_angle,
@@ -94,8 +87,13 @@ def way_through_water(seen: PathSignals) -> Way:
     )
 
 
-def passed_path(seen: PathSignals, memory: CurrentMemory, p: CurrentScales) -> Passed:
-    """Length of leg, or angle of arc, that was passed in an interval."""
+def passed_path(
+    seen: PathSignals, memory: CurrentMemory, p: CurrentScales
+) -> tuple[Number, Number]:
+    """What was passed of the path in an interval.
+
+    By how much it has turned, rad, and the speed along it, m/s, 0 where not known.
+    """
     distance, angle = seen.turns.next_distance, seen.turns.next_angle
     has_started = memory.started > 0.0
     is_turning = (distance <= 0.0) & (angle != 0.0)
@@ -118,7 +116,7 @@ def passed_path(seen: PathSignals, memory: CurrentMemory, p: CurrentScales) -> P
     turned = np.where(is_on_arc, swept, np.where(is_on_leg, 0.0, rest))
     along_arc = np.where(is_on_arc & was_turning, of_arc, 0.0)
     length = np.where(is_on_leg, of_leg, along_arc)
-    return Passed(turned, speed=length / p.interval)
+    return turned, length / p.interval
 
 
 def turned_back(way: Way, turned: Number) -> Way:

@@ -29,10 +29,10 @@ from agents.controllers.law import (
     PathSignals,
     wrapped,
 )
-from agents.controllers.linear_loop import small_motions
 from agents.controllers.lq import LQ
 from agents.settings import Step, setting
 from shipgym import ShipModel
+from shipgym.models.linear import small_motions
 from shipgym.tasks.task import Task
 
 SHORTEST_LEAD, LONGEST_LEAD = 0.1, 10.0  # ship lengths

@@ -8,6 +8,7 @@ T3).
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -198,12 +199,24 @@ def _jacobian(model: ShipModel, at: StraightRunning, names: list[str]) -> Floats
     return np.array(columns).T
 
 
+@lru_cache(maxsize=16)  # a search designs on one ship often
+def small_motions(model: ShipModel) -> tuple[StraightRunning, Floats, Floats]:
+    """Straight running, and A and B of `linearise` about it.
+
+    Raises InputError if the model has no straight course.
+    """
+    about = straight_running(model)
+    A, B = linearise(model, about)
+    return about, A, B
+
+
 def steering_state_space(model: ShipModel) -> tuple[Floats, Floats]:
     """Linear steering dynamics about straight running: A and B of `linearise`.
 
     Raises InputError if the model has no straight course.
     """
-    return linearise(model, straight_running(model))
+    _, A, B = small_motions(model)
+    return A.copy(), B.copy()
 
 
 def nomoto_of(A: Floats, B: Floats) -> Nomoto:

@@ -94,29 +94,6 @@ class FromBow(NamedTuple):
     sine: float
 
 
-class RelativeWind(NamedTuple):
-    """Wind as felt on board."""
-
-    squared_speed: float  # m2/s2
-    angle: FromBow
-
-
-class Accelerations(NamedTuple):
-    """Accelerations in the ship's axes, m/s2 and rad/s2."""
-
-    surge: float
-    sway: float
-    yaw: float
-    roll: float
-
-
-class FirstOrderMotion(NamedTuple):
-    """First-order motion in waves: heading, rad, and its rate, rad/s."""
-
-    psi: float
-    r: float
-
-
 def from_bow(sine: float, cosine: float, north: float, east: float) -> FromBow:
     """Angle from the bow to a direction, by sine and cosine of the ship's heading."""
     return FromBow(north * cosine + east * sine, east * cosine - north * sine)
@@ -124,8 +101,8 @@ def from_bow(sine: float, cosine: float, north: float, east: float) -> FromBow:
 
 def relative_wind(
     motion: Motion, sine: float, cosine: float, sea: Sea, p: SeaParameters
-) -> RelativeWind:
-    """Wind against that over the sea and against the ship's way over ground."""
+) -> tuple[float, FromBow]:
+    """Squared speed, m2/s2, and angle of the wind as it is felt on board."""
     speed = p.wind_speed + sea.gust
     north = speed * sea.wind_north + sea.current_north
     east = speed * sea.wind_east + sea.current_east
@@ -139,7 +116,7 @@ def relative_wind(
     least = slowest_wind * slowest_wind
     per_speed = 1.0 / sqrt(max(squared, least))
     angle = FromBow(cosine=ahead * per_speed, sine=aside * per_speed)
-    return RelativeWind(squared, angle)
+    return squared, angle
 
 
 def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
@@ -147,33 +124,35 @@ def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
     if not HAS_SEA:
         return CALM
     sine, cosine = sin_cos(motion.psi)
-    felt = relative_wind(motion, sine, cosine, sea, p)
-    wind = response_to(felt.angle, felt.squared_speed, p.by_wind)
+    squared, angle = relative_wind(motion, sine, cosine, sea, p)
+    surge, sway, yaw, roll = response_to(angle, squared, p.by_wind)
     # the model's own surge has the resistance of still air already
     still_air = motion.u * fabs(motion.u) * p.still_air
     waves = from_bow(sine, cosine, sea.waves_north, sea.waves_east)
-    drift = response_to(waves, 1.0 + sea.drift, p.by_waves)
+    ahead, aside, turn, heel = response_to(waves, 1.0 + sea.drift, p.by_waves)
     return Push(
-        wind.surge + still_air + drift.surge,
-        wind.sway + drift.sway,
-        wind.yaw + drift.yaw,
-        wind.roll + drift.roll + by_wave_slope(waves, sea, p),
+        surge + still_air + ahead,
+        sway + aside,
+        yaw + turn,
+        roll + heel + by_wave_slope(waves, sea, p),
         sea.current_north,
         sea.current_east,
     )
 
 
-def response_to(angle: FromBow, size: float, series: Response) -> Accelerations:
-    """Accelerations of a response at an angle, times its size."""
+def response_to(
+    angle: FromBow, size: float, series: Response
+) -> tuple[float, float, float, float]:
+    """Accelerations in surge, sway, yaw and roll at an angle, times a size."""
     cosine, sine = angle
     roll = 0.0
     if HAS_ROLL:
         roll = size * sum_of_sines(cosine, sine, series.roll)
-    return Accelerations(
-        surge=size * sum_of_cosines(cosine, sine, series.surge),
-        sway=size * sum_of_sines(cosine, sine, series.sway),
-        yaw=size * sum_of_sines(cosine, sine, series.yaw),
-        roll=roll,
+    return (
+        size * sum_of_cosines(cosine, sine, series.surge),
+        size * sum_of_sines(cosine, sine, series.sway),
+        size * sum_of_sines(cosine, sine, series.yaw),
+        roll,
     )
 
 
@@ -215,20 +194,17 @@ def first_order_motion(
     frequency: float,
     heading: Oscillator,
     p: SeaParameters,
-) -> FirstOrderMotion:
-    """First-order motion of a ship that meets waves at an angle and a frequency, rad/s.
+) -> tuple[float, float]:
+    """Heading, rad, and its rate by waves met at an angle and a frequency, rad/s.
 
-    The angle is the oscillator's velocity, which is white noise through gain s / (s^2 +
-    2 lambda w s + w^2). Its own derivative has no finite variance, so the rate is the
-    part of it that swings, -w times the displacement: of variance w^2 and a quarter of
-    a period ahead, as in waves of one frequency.
+    The heading is the oscillator's velocity, which is white noise through gain s /
+    (s^2 + 2 lambda w s + w^2). Its own derivative has no finite variance, so the rate
+    is the part of it that swings, -w times the displacement: of variance w^2 and a
+    quarter of a period ahead, as in waves of one frequency.
     """
     variance = sum_of_cosines(waves.cosine, waves.sine, p.heading_variance)
     yaw = sqrt(max(variance, 0.0))
-    return FirstOrderMotion(
-        psi=yaw * heading.velocity,
-        r=-yaw * frequency * heading.displacement,
-    )
+    return yaw * heading.velocity, -yaw * frequency * heading.displacement
 
 
 def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> Sea:
@@ -247,7 +223,7 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
     if HAS_ROLL:
         roll = Oscillator(sea.roll_displacement, sea.roll_velocity)
         roll = stepped(roll, normal(word, DRAW[6]), normal(word, DRAW[7]), step)
-    first_order = first_order_motion(waves, frequency, heading, p)
+    psi, rate = first_order_motion(waves, frequency, heading, p)
 
     north = first_order_step(
         sea.current_north, sea.mean_north, p.current, normal(word, DRAW[0])
@@ -265,8 +241,8 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
         heading.velocity,
         roll.displacement,
         roll.velocity,
-        first_order.psi,
-        first_order.r,
+        psi,
+        rate,
     )
 
 
@@ -306,7 +282,7 @@ def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
     sine, cosine = sin_cos(motion.psi)
     waves = from_bow(sine, cosine, waves_north, waves_east)
     frequency = encounter(waves, motion.u, motion.v, p)
-    first_order = first_order_motion(waves, frequency, heading, p)
+    psi, rate = first_order_motion(waves, frequency, heading, p)
     return Sea(
         mean_north=mean_north,
         mean_east=mean_east,
@@ -322,8 +298,8 @@ def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
         heading_velocity=heading.velocity,
         roll_displacement=roll.displacement,
         roll_velocity=roll.velocity,
-        psi_wave=first_order.psi,
-        r_wave=first_order.r,
+        psi_wave=psi,
+        r_wave=rate,
     )
 
 

@@ -41,13 +41,6 @@ class Fix(NamedTuple):
     turned: float  # rad, of the next turn, without its sign
 
 
-class OnArc(NamedTuple):
-    """Position on the arc of a turn."""
-
-    turned: float  # rad, from the beginning of the turn, without its sign
-    cross_track: float  # m, to starboard
-
-
 def last_waypoint(plan: Numbers) -> int:
     """Number of the last waypoint of a plan."""
     return len(plan) // 2 - 1
@@ -134,13 +127,13 @@ def fix(x: float, y: float, leg: Leg, ship: Ship, settings: Any) -> Fix:
     ahead = north * leg.cosine + east * leg.sine
     aside = east * leg.cosine - north * leg.sine
     past = ahead - (leg.turn_at - leg.begins)
-    arc = on_arc(past, aside, leg, radius)
+    turned, off_arc = on_arc(past, aside, leg, radius)
 
     is_turning = (past > 0.0) & (leg.turn != 0.0)
     straight_on = leg.begins + ahead
-    round_turn = leg.turn_at + radius * arc.turned
+    round_turn = leg.turn_at + radius * turned
     along_track = pick(is_turning, round_turn, straight_on)
-    cross_track = pick(is_turning, arc.cross_track, aside)
+    cross_track = pick(is_turning, off_arc, aside)
 
     half_ahead = along_track + 0.5 * lookahead
     first = part_of(leg.turn, half_ahead - leg.turn_at, radius)
@@ -150,12 +143,15 @@ def fix(x: float, y: float, leg: Leg, ship: Ship, settings: Any) -> Fix:
         along_track=along_track,
         cross_track=cross_track,
         course=leg.course + first + (second - back),
-        turned=pick(is_turning, arc.turned, 0.0),
+        turned=pick(is_turning, turned, 0.0),
     )
 
 
-def on_arc(past: float, aside: float, leg: Leg, radius: float) -> OnArc:
-    """Position on the turn behind a leg, `past` its beginning and `aside` of it, m."""
+def on_arc(past: float, aside: float, leg: Leg, radius: float) -> tuple[float, float]:
+    """What is turned, rad, without its sign, and the distance to starboard, m.
+
+    `past` the beginning of the turn behind a leg, and `aside` of the leg, m.
+    """
     # from the centre of the turn: along the leg, and towards the leg
     side = copysign(1.0, leg.turn)
     outward = radius - side * aside
@@ -170,10 +166,7 @@ def on_arc(past: float, aside: float, leg: Leg, radius: float) -> OnArc:
     from_centre = sqrt(across * across + reach * reach)
     beyond_reach = reach - to_middle
     inside = radius - from_centre + beyond_reach
-    return OnArc(
-        turned=half_turn + arctan2(across, reach),
-        cross_track=side * inside,
-    )
+    return half_turn + arctan2(across, reach), side * inside
 
 
 def part_of(turn: float, along_track: float, radius: float) -> float:

@@ -9,7 +9,6 @@ from agents.controllers.kalman import OUTPUT, course_filter, kalman_gain
 from agents.controllers.linear_loop import sample_ship
 from shipgym.errors import InputError
 from shipgym.instruments.noise import SEA_TRIAL
-from shipgym.models.linear import straight_running
 from shipgym.tasks import control_interval, course_keeping_task
 from tests.agents.mariners import MARINER, changed
 
@@ -17,7 +16,7 @@ UNSTABLE = changed(N_v=1.7, N_uv=1.7)
 
 
 def test_the_kalman_gain_is_that_of_python_control_and_of_the_recursion():
-    states = course_filter(MARINER, straight_running(MARINER), 1.0, disturbance=0.04)
+    states = course_filter(MARINER, 1.0, disturbance=0.04)
     transition, output, process = states.transition, OUTPUT, states.process
     noise = np.diag([SEA_TRIAL["yaw_rate"], SEA_TRIAL["heading"]]) ** 2
     gain, deviation = kalman_gain(states, noise=1.0)
