@@ -7,7 +7,7 @@ the gear's lag and the environment's sum for the integral are in it. The rudder'
 and rate are not.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,8 +28,7 @@ SWAY, YAW_RATE, ERROR, RUDDER, INTEGRAL = range(len(SIGNALS))
 ORDER = RUDDER + 1  # of the rudder, in a flow that holds it over an interval
 
 
-@dataclass(frozen=True, eq=False)
-class SampledShip:
+class SampledShip(NamedTuple):
     """Small motions about straight running: x[k + 1] = A x[k] + B order[k].
 
     Attributes

@@ -1,7 +1,7 @@
 """Margins of the loop of a linear controller around a sampled ship."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,8 +47,7 @@ class Margins:
         return self.gain_margin >= 2.0 and self.phase_margin_deg >= 30.0
 
 
-@dataclass(frozen=True, eq=False)
-class Compensator:
+class Compensator(NamedTuple):
     """Linear controller: s[k + 1] = A s[k] + B y[k], order[k] = C s[k] + D y[k].
 
     Attributes

@@ -68,7 +68,7 @@ def _texts(source: Source) -> dict[str, str]:
     token = uuid.uuid5(uuid.NAMESPACE_URL, source.header + source.source)
     wrapper = f"{name}_fmi.c"
     data = {
-        **vars(source),
+        **source._asdict(),
         "token": str(token),
         "title": comment(source.title),
         "wrapper": wrapper,

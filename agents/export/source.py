@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -41,8 +40,7 @@ def variables_of(record: Any) -> Variables:
     return found
 
 
-@dataclass(frozen=True)
-class Source:
+class Source(NamedTuple):
     """A header and a source file by a name, and what a wrapper needs to know of them.
 
     Attributes

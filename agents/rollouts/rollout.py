@@ -1,8 +1,7 @@
 """The loop in which a policy steers ships through episodes of a task, side by side."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,8 +16,7 @@ from shipgym.tasks.task import Task
 Histories = dict[str, Floats]
 
 
-@dataclass(frozen=True, eq=False)
-class Rollout:
+class Rollout(NamedTuple):
     """The course and results of some episodes of a task.
 
     Attributes

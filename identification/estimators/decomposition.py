@@ -3,8 +3,7 @@
 X'X would be smaller but loses half of the digits.
 """
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,8 +18,7 @@ from shipgym.arrays import Floats
 CONSTANT = 100 * np.finfo(float).eps
 
 
-@dataclass(frozen=True)
-class Decomposition:
+class Decomposition(NamedTuple):
     """Thin singular value decomposition of centred and scaled features, and targets.
 
     Attributes

@@ -7,7 +7,7 @@ the dual system.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,8 +23,7 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number, check_whole
 
 
-@dataclass(frozen=True)
-class LCurve:
+class LCurve(NamedTuple):
     """Norms of residual and solution of the solutions of rank 1, 2, ..."""
 
     residual_norm: Floats  # Euclidean, of the residuals, shape (n_ranks,)

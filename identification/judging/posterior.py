@@ -343,8 +343,7 @@ def _begun(part: Segment, model: ShipModel, trial: Trial) -> Segment:
     for column, name in enumerate(model.state_names):
         if name in ("psi", *"uvr"):
             start[column] = begun[name][0]
-    return replace(
-        part,
+    return part._replace(
         start=start,
     )
 

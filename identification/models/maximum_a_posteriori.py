@@ -7,7 +7,7 @@ narrower the prior is made, the trials decide, each predicted from the others.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -83,8 +83,7 @@ DEVIATIONS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class MMGPrior:
+class MMGPrior(NamedTuple):
     """Normal distribution of the coefficients before any trial."""
 
     source: str  # the reference ship, or whose formulas

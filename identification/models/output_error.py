@@ -10,7 +10,7 @@ import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,8 +41,7 @@ from shipgym.arrays import Floats, Integers
 from shipgym.trials.resampling import usual_step
 
 
-@dataclass(frozen=True, eq=False)
-class Shooting:
+class Shooting(NamedTuple):
     """Errors of all segments at a set of parameters."""
 
     #: simulated less measured, by the scale of the channel, blocks averaged: those of
@@ -53,8 +52,7 @@ class Shooting:
     moves: list[Floats]  # by segment: how its start would move, shape (n_free,)
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(NamedTuple):
     """Parameters of least cost, and where the last round of the fit ended."""
 
     parameters: Floats  # as `OutputError.shoot` takes them
@@ -137,7 +135,7 @@ class OutputError:
         for segment, move in zip(segments, shooting.moves, strict=True):
             start = segment.start.copy()
             start[self.free_columns] += move * channel_units(self.model, self.free)
-            moved = replace(segment, start=start)
+            moved = segment._replace(start=start)
             again = self.shoot(parameters, [moved], scales)
             found.append(moved if np.isfinite(again.residuals).all() else segment)
         return found

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,8 +25,7 @@ from shipgym.trials.resampling import usual_step
 BLOCK = 0.05  # time over which residuals are averaged, of that to sail one ship length
 
 
-@dataclass(frozen=True, eq=False)
-class Segment:
+class Segment(NamedTuple):
     """A stretch of a trial."""
 
     trial: int  # index of the trial
@@ -290,8 +289,7 @@ def in_columns(values: Floats, number: int) -> Floats:
 LARGEST = 1e3  # error of a ship that runs away, in scales
 
 
-@dataclass(frozen=True, eq=False)
-class CoefficientPrior:
+class CoefficientPrior(NamedTuple):
     """Normal distribution of the coefficients before the trials.
 
     A point has the coefficients in numbers that are independent and of standard

@@ -63,14 +63,6 @@ MAY_FAIL = False
 judged = changer(EpisodeCounters, "ended", "episode_cost")
 
 
-class LaneView(NamedTuple):
-    """A ship, the data of her model, and the scales of her observations."""
-
-    ship: Ship
-    data: Envelope
-    scale: Any  # an `Observation` of factors
-
-
 class AllSettings(NamedTuple):
     """Settings of the engine, the sensor set and the task."""
 
@@ -79,12 +71,12 @@ class AllSettings(NamedTuple):
     task: Any
 
 
-def view_of(tile: Tile, lane: int) -> LaneView:
-    """Return the view of a lane."""
-    return LaneView(
-        ship=load_ship(tile.ships, lane),
-        data=load_envelope(tile.ships, lane),
-        scale=load_scale(tile.ships, lane),
+def view_of(tile: Tile, lane: int) -> tuple[Ship, Envelope, Any]:
+    """A ship, the data of her model, and the factors of her observations."""
+    return (
+        load_ship(tile.ships, lane),
+        load_envelope(tile.ships, lane),
+        load_scale(tile.ships, lane),
     )
 
 

@@ -1,7 +1,6 @@
 """Time of execution of a manoeuvre, by the ordered or measured rudder."""
 
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,13 +12,6 @@ from shipgym.trials.trial import Trial
 # Beyond these parts of its usual angle an ordered rudder, and a measured one whose zero
 # may be off, is held.
 ORDERED, MEASURED = 0.9, 0.75
-
-
-class Reversals(NamedTuple):
-    """Times at which the rudder of a zigzag was ordered, s."""
-
-    start: float  # the first order
-    turns: list[float]  # each reversal
 
 
 def rudder(trial: Trial) -> Floats:
@@ -57,8 +49,8 @@ def execute_time(trial: Trial) -> float:
     return max(left, float(t[0]))
 
 
-def reversals(trial: Trial) -> Reversals:
-    """Times of the first order and of each reversal of the rudder in a zigzag.
+def reversals(trial: Trial) -> tuple[float, list[float]]:
+    """Times of the first order and of each reversal of the rudder in a zigzag, s.
 
     An ordered rudder reverses at the first sample that has the new order; a measured
     one when it left the angle at which it was held (`departure`).
@@ -71,8 +63,8 @@ def reversals(trial: Trial) -> Reversals:
     part = ORDERED if ordered else MEASURED
     holds = _holds(t, delta, start, part * usual)
     if not ordered:
-        return Reversals(start, _departures(t, delta, holds))
-    return Reversals(start, t[[hold[0] for hold in holds[1:]]].tolist())
+        return start, _departures(t, delta, holds)
+    return start, t[[hold[0] for hold in holds[1:]]].tolist()
 
 
 def _departures(t: Floats, delta: Floats, holds: list[Floats]) -> list[float]:

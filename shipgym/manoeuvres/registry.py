@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -74,8 +74,7 @@ def check_physical(model: ShipModel, trial: Trial) -> None:
 Variants = Callable[[ShipModel], Mapping[str, Manoeuvre]]
 
 
-@dataclass(frozen=True)
-class Family:
+class Family(NamedTuple):
     """Manoeuvres of one kind, a section of the page that `shipgym trials` writes."""
 
     title: str

@@ -7,8 +7,7 @@ of the names ink, faint, land, safe, warning and danger.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from shipgym.checks import unexpected
 from shipgym.errors import InputError
@@ -27,16 +26,14 @@ _COLOURS: dict[str, Rgb] = {
 Colour = str | Rgb
 
 
-@dataclass(frozen=True, eq=False)
-class Line:
+class Line(NamedTuple):
     """Line through points, shape (n, 2)."""
 
     points: Any
     colour: Colour = "ink"
 
 
-@dataclass(frozen=True, eq=False)
-class Circle:
+class Circle(NamedTuple):
     """Circle, its line or, `filled`, its area."""
 
     x: float  # m, of its centre
@@ -46,8 +43,7 @@ class Circle:
     filled: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class ShipOutline:
+class ShipOutline(NamedTuple):
     """Another ship from above."""
 
     x: float  # m
@@ -58,8 +54,7 @@ class ShipOutline:
     colour: Colour = "ink"
 
 
-@dataclass(frozen=True, eq=False)
-class ChartWidth:
+class ChartWidth(NamedTuple):
     """Width of the chart, in place of fourteen ship lengths; the last one counts."""
 
     width: float  # m
