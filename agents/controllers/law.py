@@ -207,6 +207,12 @@ def wrapped(angle: Number) -> Number:
     return np.mod(angle + np.pi, 2.0 * np.pi) - np.pi
 
 
+def rotated(ahead: Number, aside: Number, angle: Number) -> tuple[Number, Number]:
+    """Vector in axes turned to starboard by an angle, rad."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return ahead * cosine + aside * sine, aside * cosine - ahead * sine
+
+
 def gathered(
     integral: Number, error: Number, started: Number, dt: float, reach: float
 ) -> Number:

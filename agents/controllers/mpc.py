@@ -28,6 +28,7 @@ from agents.controllers.law import (
     PathSignals,
     Signals,
     linear_law,
+    rotated,
     wrapped,
 )
 from agents.controllers.lq import LQ
@@ -158,9 +159,9 @@ class MPC(WheelOver):
         The observed course over ground corrects it.
         """
         swung = seen.yaw_rate * self.design["dt"]
-        ahead, aside = turned(known.ahead, known.aside, swung)
+        ahead, aside = rotated(known.ahead, known.aside, swung)
         # across the course over ground there is no velocity over ground
-        _, across = turned(seen.surge + ahead, seen.sway + aside, seen.drift)
+        _, across = rotated(seen.surge + ahead, seen.sway + aside, seen.drift)
         # share of the current's error that is taken over in an interval
         current_gain = 0.5
         error = current_gain * across
@@ -308,7 +309,9 @@ class DesignModels:
         self.guide = guide
         self.dt = COARSE * guide.design["dt"]
         self.turns = seen.turns
-        self.north, self.east = turned(current.ahead, current.aside, seen.heading_error)
+        self.north, self.east = rotated(
+            current.ahead, current.aside, seen.heading_error
+        )
         self.cross_track = seen.cross_track
         self.along = np.zeros_like(seen.cross_track)
         n = len(self.along)
@@ -362,7 +365,7 @@ class DesignModels:
     def move(self, north: Floats, east: Floats) -> None:
         """Move along and across the path by a way over ground, m."""
         way = np.hypot(north, east)
-        ahead, aside = turned(north, east, self.path_course(0.5 * way))
+        ahead, aside = rotated(north, east, self.path_course(0.5 * way))
         bent = self.path_course(way) - self.path_course(0.0)
         curvature = bent / np.maximum(way, 1e-9)
         # inside of an arc the same way goes by more of it
@@ -380,7 +383,7 @@ class DesignModels:
         """Angle from the velocity through the water to that over ground, rad."""
         surge = self.read("u")
         sway = self.read("v")
-        ahead, aside = turned(self.north, self.east, self.read("psi"))
+        ahead, aside = rotated(self.north, self.east, self.read("psi"))
         over_ground = np.arctan2(sway + aside, surge + ahead)
         return np.asarray(wrapped(over_ground - np.arctan2(sway, surge)))
 
@@ -396,12 +399,6 @@ class DesignModels:
             surge=self.read("u"),
             last_order=rudder,
         )
-
-
-def turned(ahead: Number, aside: Number, angle: Number) -> tuple[Number, Number]:
-    """Vector in axes turned to starboard by an angle, rad."""
-    cosine, sine = np.cos(angle), np.sin(angle)
-    return ahead * cosine + aside * sine, aside * cosine - ahead * sine
 
 
 def add_step_cost(cost: Floats, guide: MPC, models: DesignModels) -> None:

@@ -32,6 +32,7 @@ from agents.controllers.law import (
     Number,
     PathSignals,
     clipped,
+    rotated,
     slowness_of,
     wrapped,
 )
@@ -40,7 +41,6 @@ from agents.controllers.seen_current import (
     CurrentMemory,
     CurrentScales,
     seen_current,
-    way_through_water,
 )
 from agents.controllers.wheel_over import own_lead
 from agents.settings import Step, setting
@@ -122,7 +122,8 @@ def current_scales(p: PreviewGains) -> CurrentScales:
 
 def wanted_course(seen: PathSignals, current: CurrentMemory, p: PreviewGains) -> Number:
     """Course over ground, against the direction of the path beside the ship, rad."""
-    over_ground = way_through_water(seen).ahead + current.ahead
+    through_water, _ = rotated(seen.surge, seen.sway, seen.heading_error)
+    over_ground = through_water + current.ahead
     pace = clipped(over_ground / p.service_speed, 0.3, 3.0)
     nearness = np.exp(-p.reach_power * np.log(pace))
     turns = seen.turns

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.controllers.law import Number, PathSignals, clipped, wrapped
+from agents.controllers.law import Number, PathSignals, clipped, rotated, wrapped
 
 
 class CurrentMemory(NamedTuple):
@@ -39,20 +39,13 @@ class CurrentScales(NamedTuple):
     fastest: Number  # m/s
 
 
-class Way(NamedTuple):
-    """Motion in the axes of the path beside the ship."""
-
-    ahead: Number  # m/s
-    aside: Number  # m/s, to starboard
-
-
 def seen_current(
     seen: PathSignals, memory: CurrentMemory, p: CurrentScales
 ) -> CurrentMemory:
     """Current by another interval."""
     turned, speed = passed_path(seen, memory, p)
-    water = way_through_water(seen)
-    carried = turned_back(Way(memory.ahead, memory.aside), turned)
+    water_ahead, water_aside = rotated(seen.surge, seen.sway, seen.heading_error)
+    carried_ahead, carried_aside = rotated(memory.ahead, memory.aside, turned)
 
     over_ground = wrapped(seen.drift - seen.heading_error)  # against the path
     most_across = 1.2  # rad: beyond, the speed along the path says little
@@ -60,30 +53,21 @@ def seen_current(
     is_likely = (speed > p.slowest) & (speed < p.fastest)
     is_seen = is_along & is_likely
 
-    ahead = np.where(is_seen, speed, water.ahead + carried.ahead)
+    ahead = np.where(is_seen, speed, water_ahead + carried_ahead)
     slope = np.tan(np.where(is_along, over_ground, 0.0))
-    aside = np.where(is_along, ahead * slope - water.aside, carried.aside)
+    aside = np.where(is_along, ahead * slope - water_aside, carried_aside)
     is_first = is_seen & (memory.is_known == 0.0)
     update = np.where(is_first | (memory.started == 0.0), 1.0, p.update)
-    seen_ahead = clipped(ahead - water.ahead, -p.fastest, p.fastest)
+    seen_ahead = clipped(ahead - water_ahead, -p.fastest, p.fastest)
     seen_aside = clipped(aside, -p.fastest, p.fastest)
     return CurrentMemory(
-        ahead=carried.ahead + update * (seen_ahead - carried.ahead),
-        aside=carried.aside + update * (seen_aside - carried.aside),
+        ahead=carried_ahead + update * (seen_ahead - carried_ahead),
+        aside=carried_aside + update * (seen_aside - carried_aside),
         turned=turned,
         is_known=np.where(is_seen, 1.0, memory.is_known),
         distance=seen.turns.next_distance,
         angle=seen.turns.next_angle,
         started=1.0,
-    )
-
-
-def way_through_water(seen: PathSignals) -> Way:
-    """Her way through the water in the axes of the path."""
-    cosine, sine = np.cos(seen.heading_error), np.sin(seen.heading_error)
-    return Way(
-        ahead=seen.surge * cosine + seen.sway * sine,
-        aside=seen.sway * cosine - seen.surge * sine,
     )
 
 
@@ -117,12 +101,3 @@ def passed_path(
     along_arc = np.where(is_on_arc & was_turning, of_arc, 0.0)
     length = np.where(is_on_leg, of_leg, along_arc)
     return turned, length / p.interval
-
-
-def turned_back(way: Way, turned: Number) -> Way:
-    """The same motion in axes that have turned to starboard, rad."""
-    cosine, sine = np.cos(turned), np.sin(turned)
-    return Way(
-        ahead=way.ahead * cosine + way.aside * sine,
-        aside=way.aside * cosine - way.ahead * sine,
-    )

@@ -28,7 +28,6 @@ from shipgym.tasks.other_ships import (
     CASE_DRAW,
     COUNT_DRAW,
     NOBODY,
-    Answers,
     Other,
     Seen,
     decided,
@@ -201,8 +200,7 @@ def met_at(
         meeting = imazu_meeting(case, number, run, random, ship)
     elif case == 0 and number < count:
         meeting = random_meeting(number, run, random, ship)
-    answers = Answers(settings.ignoring, settings.wrong_way)
-    return other_ship(meeting, number, own, answers, random, ship)
+    return other_ship(meeting, number, own, settings, random, ship)
 
 
 def course_to_track(motion: Motion, ship: Ship) -> float:

@@ -98,13 +98,6 @@ class Other(NamedTuple):
     avoiding: float  # 1 while she gives way
 
 
-class Answers(NamedTuple):
-    """Shares of the other ships that do not keep to the rules."""
-
-    ignoring: float  # do not give way
-    wrong_way: float  # turn to port
-
-
 class Meeting(NamedTuple):
     """How another ship meets own ship, who sails north."""
 
@@ -169,7 +162,7 @@ def other_ship(
     meeting: Meeting,
     number: int,
     own: Motion,
-    answers: Answers,
+    settings: Any,
     random: Random,
     ship: Ship,
 ) -> Other:
@@ -200,23 +193,23 @@ def other_ship(
         psi=meeting.course,
         r=0.0,
     )
-    habits = habits_of(meeting, first, answers, random, ship)
+    habits = habits_of(meeting, first, settings, random, ship)
     return Other(place, habits, 0.0)
 
 
 def habits_of(
     meeting: Meeting,
     first: int,
-    answers: Answers,
+    settings: Any,
     random: Random,
     ship: Ship,
 ) -> Habits:
     """Draw what another ship keeps over an episode; `first` is that of her draws."""
     share = drawn(random, first + ANSWER_DRAW, 0.0, 1.0)
     answer = 1.0
-    if share < answers.ignoring:
+    if share < settings.ignoring:
         answer = 0.0
-    elif share < answers.ignoring + answers.wrong_way:
+    elif share < settings.ignoring + settings.wrong_way:
         answer = -1.0
     lengths = drawn(random, first + HEED_DRAW, 6.0, 12.0)
     return Habits(

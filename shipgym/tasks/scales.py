@@ -48,17 +48,9 @@ def observation_scales(model: ShipModel) -> Floats:
     speed = model.particulars["speed"]
     largest_integral = INTEGRAL_ZONE * INTEGRAL_LENGTHS * length / speed
     rudder_limit = model.steering.limit
-    scales = {
-        "heading_error_sin": 1.0,
-        "heading_error_cos": 1.0,
-        "yaw_rate": speed / length,
-        "sway": speed,
-        "surge": speed,
-        "rudder": rudder_limit,
-        "last_command": rudder_limit,
-        "heading_error_integral": largest_integral,
-    }
-    return np.array([scales[name] for name in OBSERVATION_NAMES])
+    angle = (1.0, 1.0)  # sine and cosine
+    motion = (speed / length, speed, speed)
+    return np.array([*angle, *motion, rudder_limit, rudder_limit, largest_integral])
 
 
 @takes_name
