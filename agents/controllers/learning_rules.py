@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from agents.controllers.law import wrapped
+
 
 class LearningRule:
     """A rule with its numbers, for observations of some names."""
@@ -243,11 +245,6 @@ class Others(NamedTuple):
     sine: Any
     speed: Any
     weight: Any
-
-
-def wrapped(angle: Any) -> Any:
-    """The angle in [-pi, pi)."""
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi
 
 
 #: Rules by the names that a suite gives them.
