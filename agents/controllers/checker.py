@@ -3,8 +3,7 @@
 It checks what rollouts, the benchmark and the tools of stable-baselines3 rely on.
 """
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -105,8 +104,7 @@ def check_episode(asking: "_Asking", ship: ShipModel, task: Task, n_steps: int) 
     asking.check_same(begun, fresh, where)
 
 
-@dataclass(frozen=True)
-class _Asking:
+class _Asking(NamedTuple):
     """Asks a controller, and refuses answers that nobody can rely on."""
 
     controller: Policy

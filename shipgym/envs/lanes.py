@@ -351,10 +351,7 @@ def _scale_factors(task: Task, ship: Ship) -> list[float]:
     factors = []
     for spec in task.definition.observations.values():
         scale = task.scale_of(spec, ship)
-        if scale == 0.0:
-            factors.append(0.0)
-        else:
-            factors.append(1.0 / scale)
+        factors.append(1.0 / scale if scale else 0.0)
     return factors
 
 
@@ -365,11 +362,8 @@ def envelope_numbers(model: ShipModel) -> Floats:
         triangle = data.shape[np.triu_indices(4)]
         return np.concatenate([data.low, data.high, data.centre, triangle])
 
-    n_bounds = len(Four._fields)
-    infinite = np.full(n_bounds, np.inf)
-    centre = np.zeros(n_bounds)
-    triangle = np.zeros(len(Triangle._fields))
-    return np.concatenate([-infinite, infinite, centre, triangle])
+    n = len(Four._fields)
+    return np.repeat([-np.inf, np.inf, 0.0], [n, n, n + len(Triangle._fields)])
 
 
 def ship_tiles(columns: Floats, tiles: int, own: bool) -> Floats:
