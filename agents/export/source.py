@@ -92,11 +92,7 @@ def render(template: str, name: str = "", **data: Any) -> str:
 
 def c_source(template: str, name: str, **data: Any) -> str:
     """Source in C made from a template, after the functions that it calls."""
-    return with_prelude(name, render(template, name, **data))
-
-
-def with_prelude(name: str, body: str) -> str:
-    """Text of a source after the header and the functions of the prelude it calls."""
+    body = render(template, name, **data)
     return render("prelude.c.j2", name, body=body)
 
 

@@ -454,10 +454,6 @@ def is_variable(node: Node, uses: Counter[int]) -> bool:
     return n_uses > 1 or is_call or bool(node.hint)
 
 
-#: How closely operators bind, where no brackets are needed for the reader.
-BINDING = {"+": 1, "-": 1, "*": 2, "/": 2}
-
-
 def written(node: Any, names: Mapping[int, str]) -> str:
     """Text of a node, of names where it has variables."""
     if not isinstance(node, Node):
@@ -465,12 +461,8 @@ def written(node: Any, names: Mapping[int, str]) -> str:
     if id(node) in names:
         return names[id(node)]
     parts = []
-    for place, part in enumerate(node.parts):
+    for part in node.parts:
         text = written(part, names)
-        own, inner = BINDING.get(node.sign, 9), BINDING.get(part.sign, 0)
-        is_left = place == 0 and node.text.startswith("%s")
-        is_free = inner > own or (inner == own and is_left)
-        needs_brackets = node.sign and part.sign and not is_free
-        is_named = id(part) in names
-        parts.append(f"({text})" if needs_brackets and not is_named else text)
+        is_single = not (node.sign and part.sign) or id(part) in names
+        parts.append(text if is_single else f"({text})")
     return node.text % tuple(parts)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from agents.export.c_syntax import c_name, literal
-from agents.export.source import with_prelude
+from agents.export.source import render
 from agents.export.translator import Translator
 from shipgym.engine import mathematics
 from shipgym.errors import InputError
@@ -26,7 +26,7 @@ def compiled(folder, functions):
         head = f"double f{k}(double x)"
         lines += [f"{head};", f"{head} {{ return {name}(x); }}"]
     body = [*c.structures.texts, *c.functions, *lines]
-    text = with_prelude("it", "\n".join(body))
+    text = render("prelude.c.j2", "it", body="\n".join(body))
     library = built(folder, "it", "", text)
     found = []
     for k in range(len(functions)):
