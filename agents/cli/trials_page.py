@@ -60,10 +60,9 @@ def _figures(
     figures = []
     for number, (key, run) in enumerate(runs.items()):
         manoeuvre = family[key]
-        draw = manoeuvre.figure or manoeuvre_figure
         title = key[0].upper() + key[1:]
         caption = f"{title}. {manoeuvre.caption}"
-        figures.append((f"{name}-{number}", draw(run), caption))
+        figures.append((f"{name}-{number}", manoeuvre_figure(run), caption))
     if runs:
         caption = "Paths from above, north up, in metres."
         figures.append((f"{name}-paths", path_figure(runs), caption))

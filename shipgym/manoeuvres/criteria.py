@@ -136,11 +136,6 @@ class Criterion:
         """Unit of the index: "ship lengths" or "deg"."""
         return self.rule.unit
 
-    @property
-    def source(self) -> str:
-        """Paragraph of the annex of MSC.137(76)."""
-        return self.rule.source
-
     @cached_property
     def drawn(self) -> IndexInterval | None:
         """The index over models drawn from the covariance, on the worse side."""
@@ -280,7 +275,7 @@ class Criterion:
             "deciding_trials": list(self.deciding_trials),
             "passed": self.passed,
             "unit": self.unit,
-            "source": self.source,
+            "source": self.rule.source,
         }
         if self.note:
             fields["note"] = self.note

@@ -1,10 +1,8 @@
 """Manoeuvres known by name: those of this package, and those that a user registers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,9 +11,6 @@ from shipgym.errors import InputError, UnstableModelError
 from shipgym.models.by_name import takes_name
 from shipgym.models.ship_model import ShipModel
 from shipgym.trials.trial import Trial
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
 
 FASTEST = 1.5  # speed by that of service that no manoeuvre at service power exceeds
 QUICKEST_TURN = 3.0  # likewise the yaw rate by U / L
@@ -30,9 +25,6 @@ class Manoeuvre:
     indices: Callable[[Trial], Any]  # from the trial to its indices
     outcome: type  # the dataclass of its indices, units in the names of its fields
     caption: str = ""  # caption of its figure
-    # from the run to its figure; by default its time histories
-    # (`shipgym.plots.manoeuvre_figure`)
-    figure: Callable[[Trial], Figure] | None = None
 
     @property
     def no_indices(self) -> dict[str, float | None]:
