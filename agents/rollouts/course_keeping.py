@@ -1,7 +1,6 @@
 """Episodes of course keeping and step responses of one controller on many ships."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,8 +20,7 @@ from shipgym.tasks.task import Task, course_keeping_task
 RECORDED = ("psi", "delta", "set_point", *course_keeping_task().info_names)
 
 
-@dataclass(frozen=True, eq=False)
-class Episodes:
+class Episodes(NamedTuple):
     """Episodes of course keeping, each array of shape (n_episodes,).
 
     Attributes

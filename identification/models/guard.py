@@ -5,9 +5,8 @@ data take over.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -173,8 +172,7 @@ def why_unphysical(
     return None
 
 
-@dataclass(frozen=True)
-class GuardedFit:
+class GuardedFit(NamedTuple):
     """A fit and what the guard did to it."""
 
     model: ShipModel  # with the identified coefficients

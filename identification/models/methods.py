@@ -1,10 +1,9 @@
 """Methods of identification: which estimator is fitted to each equation."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from sklearn.base import clone
@@ -62,8 +61,7 @@ def fit_all(make: Callable[[], Estimator], samples: Samples) -> Estimators:
     return estimators
 
 
-@dataclass(frozen=True)
-class Method:
+class Method(NamedTuple):
     """A way to fit the regressions."""
 
     name: str  # as `identify` knows it
@@ -93,7 +91,7 @@ def get_method(method: str | Any) -> Method:
         method = make_method(check_choice(method, METHODS, "method", more))
     if isinstance(method, Refinement):
         start = get_method(TruncatedLSSVM())
-        return replace(start, name=Refinement.name, refinement=method)
+        return start._replace(name=Refinement.name, refinement=method)
     if not hasattr(method, "fit"):
         raise InputError(
             f"method: expected one of {quoted(METHODS)}, or an estimator with"

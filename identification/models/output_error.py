@@ -8,7 +8,7 @@ Bock 1983): whole trials would let a drift of heading leak into the coefficients
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -370,7 +370,7 @@ def refine(
     scales = fit.scales(at_start, fit.units)  # not finite where a ship runs away
     if not (start.stable and np.isfinite(scales).all()):
         report["decision"] = "not refined: the start runs away"
-        return replace(start, refinement=report)
+        return start._replace(refinement=report)
 
     rejected = list[dict[str, Any]]()
     pull = settings.pull
@@ -393,8 +393,7 @@ def refine(
         if rejected:
             report["rejected"] = rejected
         covariance, influences = fit.covariance(solution, memory)
-        return replace(
-            start,
+        return start._replace(
             model=model,
             estimators=_with_values(start, coefficients),
             refinement=report,
@@ -403,7 +402,7 @@ def refine(
         )
 
     report |= {"decision": "not refined: it runs away", "rejected": rejected}
-    return replace(start, refinement=report)
+    return start._replace(refinement=report)
 
 
 def _with_values(start: GuardedFit, coefficients: Floats) -> Estimators:

@@ -12,7 +12,6 @@ functions that load and store records.
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
@@ -146,8 +145,7 @@ def _short_names(kind: Any, prefix: str, kinds: Mapping[Any, int]) -> Iterator[s
             yield from _short_names(part, f"{prefix}{name}_", kinds)
 
 
-@dataclass(frozen=True)
-class Rows:
+class Rows(NamedTuple):
     """The rows of a record in a tile or vector."""
 
     record: Record

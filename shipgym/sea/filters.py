@@ -102,14 +102,9 @@ def oscillator_step(turn: float, damping: float, ringing: float) -> OscillatorSt
     )
 
 
-def stepped(
-    now: Oscillator, first_noise: float, second_noise: float, step: OscillatorStep
-) -> Oscillator:
-    """State of an oscillator after a step."""
-    z1 = now.displacement
-    z2 = now.velocity
-    w1 = first_noise
-    w2 = second_noise
+def stepped(now: Oscillator, w1: float, w2: float, step: OscillatorStep) -> Oscillator:
+    """State of an oscillator after a step, by two numbers of noise."""
+    z1, z2 = now
     displacement = step.p11 * z1 + step.p12 * z2
     velocity = step.p22 * z2 - step.p12 * z1
     return Oscillator(

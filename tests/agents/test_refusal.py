@@ -65,8 +65,7 @@ def test_a_refusal_says_how_often_which_models_were_lost_and_when(chain):
     (first, *_) = found.pilots
     n = found.draws
     lost = np.arange(n) < 3
-    episodes = replace(
-        first.episodes,
+    episodes = first.episodes._replace(
         terminated=lost,
         duration_s=np.full(n, 40.0),
     )
