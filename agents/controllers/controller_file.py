@@ -151,9 +151,7 @@ def read_scales(value: Any, names: tuple[str, ...]) -> tuple[float, ...]:
     bounds = Bounds(1e-9, 1e9)
     scales = []
     for name, one in zip(names, value, strict=True):
-        place = f"{where}: '{name}'"
-        scale = _number(one, bounds, place)
-        scales.append(scale)
+        scales.append(_number(one, bounds, f"{where}: '{name}'"))
     return tuple(scales)
 
 

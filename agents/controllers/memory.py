@@ -38,14 +38,9 @@ def to_rows(record: Any, n_ships: int) -> Floats:
 
     A number in place of a column is that of all ships.
     """
-    columns = []
-    for one in _columns(record):
-        column = np.broadcast_to(one, n_ships)
-        columns.append(column)
-    shape = (len(columns), n_ships)
+    columns = [np.broadcast_to(one, n_ships) for one in _columns(record)]
     array = np.array(columns, dtype=np.float64)
-    whole = array.reshape(shape)
-    rows: Floats = whole.T
+    rows: Floats = array.reshape(len(columns), n_ships).T
     return rows
 
 

@@ -334,12 +334,11 @@ def check_part(agent: Any) -> None:
 
     `agent`: a policy, or the ships among which it learns (`ResidualVecEnv`).
     """
-    largest_authority = 2.0
     check_number(
         agent.authority,
         "authority",
         above=0.0,
-        at_most=largest_authority,
+        at_most=2.0,
     )
     check_whole(agent.frame_stack, "frame_stack", at_least=1)
     check_whole(agent.action_repeat, "action_repeat", at_least=1)

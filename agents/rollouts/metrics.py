@@ -73,11 +73,8 @@ def violations(run: Rollout) -> dict[str, Floats]:
     """Share of the time in which each constraint of the task is broken."""
     shares = {}
     for name in run.task.constraints:
-        amount = during(run, CONSTRAINT + name)
-        broken = amount > 0.0
-        intervals = total(broken)
-        share = ratio(intervals, run.steps)
-        shares[f"violated_{name}"] = share
+        broken = during(run, CONSTRAINT + name) > 0.0
+        shares[f"violated_{name}"] = ratio(total(broken), run.steps)
     return shares
 
 

@@ -179,7 +179,11 @@ class ShipsEnv:
             allow_unstable=given["allow_unstable"],
             cut_off=np.inf if longest == -1 else longest * self.pace.action_repeat,
         )
-        self._artists = [] if mode is None else _artists(num_envs)
+        self._artists: list[Artist] = []
+        if mode is not None:
+            from shipgym.envs.rendering import Artist  # needed only for pictures
+
+            self._artists = [Artist(row) for row in range(num_envs)]
         self._observe_and_order(num_envs)
         self._begun = False  # and not closed since
         self._keys: NDArray[np.uint64] | None = None  # of each row's episodes
@@ -314,12 +318,6 @@ class ShipsEnv:
                 artist.begin(engine)
             else:
                 artist.note(engine)
-
-
-def _artists(num_envs: int) -> list[Artist]:
-    from shipgym.envs.rendering import Artist  # needed only for pictures
-
-    return [Artist(row) for row in range(num_envs)]
 
 
 def rebuild(

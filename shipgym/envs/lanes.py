@@ -299,8 +299,7 @@ class Lanes:
 
 def _first_entries(rows: Sequence[int]) -> NDArray[np.int64]:
     """First entries of rows in a tile, shape (1, n_rows)."""
-    numbers = np.array([rows], dtype=np.int64)
-    return LANES * numbers
+    return LANES * np.array([rows], dtype=np.int64)
 
 
 def lanes_of(tiles: NDArray[Any]) -> NDArray[Any]:

@@ -199,13 +199,12 @@ def _draw_ship(
 def _readouts(engine: Engine, lane: int, state: dict[str, float]) -> dict[str, str]:
     """Quantities of a lane, with their values and units."""
     lines = {"speed": f"{hypot(state['u'], state['v']) / KNOT:.1f} kn"}
-    angles = {"heading": "psi", "to steer": "set_point"}
-    for label, name in angles.items():
+    for label, name in (("heading", "psi"), ("to steer", "set_point")):
         if name in state:
             lines[label] = f"{degrees(state[name]) % 360.0:05.1f} deg"
-    lines["rudder"] = f"{degrees(state['delta']):+.1f} deg"
-    if "phi" in state:
-        lines["heel"] = f"{degrees(state['phi']):+.1f} deg"
+    for label, name in (("rudder", "delta"), ("heel", "phi")):
+        if name in state:
+            lines[label] = f"{degrees(state[name]):+.1f} deg"
     if "cross_track" in engine.task.info_names:
         lines["cross-track"] = f"{engine.info('cross_track')[lane]:+.0f} m"
     if state.get("wind_speed"):

@@ -141,8 +141,7 @@ def reached(values: Floats, threshold: float, other: Floats) -> float | None:
         return None
     first = max(int(past[0]), 1)
     around = slice(first - 1, first + 1)
-    at = np.interp(threshold, values[around], other[around])
-    return float(at)
+    return float(np.interp(threshold, values[around], other[around]))
 
 
 def number_of_steps(duration: float, dt: float) -> int:

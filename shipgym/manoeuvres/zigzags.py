@@ -134,10 +134,10 @@ def zigzag_indices(
     if switch is None:
         switch = switch_heading_deg(trial)
 
-    overshoots: list[float | None] = []
-    for turn, end in pairwise([*turns, float(trial.t[-1])]):
-        overshoot = _overshoot_deg(trial, start, turn, end, switch)
-        overshoots.append(overshoot)
+    overshoots = [
+        _overshoot_deg(trial, start, turn, end, switch)
+        for turn, end in pairwise([*turns, float(trial.t[-1])])
+    ]
     lpp = ship_length(trial, length)
     return ZigzagIndices(
         overshoot_1_deg=overshoots[0],
