@@ -349,7 +349,10 @@ def _scale_factors(task: Task, ship: Ship) -> list[float]:
     """Observations of quantities of 1; 0 for those that such a ship does not have."""
     factors = []
     for spec in task.definition.observations.values():
-        scale = task.scale_of(spec, ship)
+        scale = task.scale_of(
+            spec,
+            ship,
+        )
         factors.append(1.0 / scale if scale else 0.0)
     return factors
 

@@ -202,9 +202,13 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         # in each step, because a wrapper such as TimeLimit may end the episode
         info["episode_cost"] = float(self._episode_cost[0])
         info["is_success"] = info.get("success", not ended)
-        seen = self._seen()
-        cut_off = truncated > 0.0
-        return seen, reward, ended, cut_off, EpisodeInfo(info)
+        return (
+            self._seen(),
+            reward,
+            ended,
+            truncated > 0.0,
+            EpisodeInfo(info),
+        )
 
     def _seen(self, begun: Flags | None = None) -> Observation:
         """Return a copy of what the agent sees."""
