@@ -102,5 +102,5 @@ def stopping_criterion(stop: Mapping[str, IndexInterval] | None) -> Criterion:
     if stop is not None:
         side = Side(name="", drawn=stop[STOPPING.index])
         return Criterion(STOPPING, STOPPING.manoeuvre, (side,))
-    remark = "not assessable: its equations hold for a shaft turning ahead only"
+    remark = "not assessable: its equations do not hold for a shaft turning astern"
     return Criterion(STOPPING, remark=remark)

@@ -149,7 +149,7 @@ MISUSES = [
     ),
     (
         lambda: path_policy().check_fits(*shown_by(course_keeping_task())),
-        "observations: expected 15 observations, got 8",
+        "observation 8: expected 'cross_track', got 'none'",
     ),
     (
         lambda: path_policy().predict(SEEN),
