@@ -45,8 +45,8 @@ def model_of(ship: ShipEquations) -> ShipModel:
 # ---- reference ships -----------------------------------------------------------------
 
 
-def mariner(service_speed: float = 7.7175) -> ShipModel:
-    """Mariner class cargo ship, 3 degrees of freedom; service speed U0 in m/s."""
+def mariner() -> ShipModel:
+    """Mariner class cargo ship, 3 degrees of freedom."""
     ship = published_ships()["mariner"]
     # the literature writes the polynomials for a rudder positive to port: odd powers
     # of the rudder change their sign
@@ -57,7 +57,7 @@ def mariner(service_speed: float = 7.7175) -> ShipModel:
     return ShipModel(
         name="mariner",
         structure="abkowitz",
-        particulars=Particulars(**(ship["particulars"] | {"speed": service_speed})),
+        particulars=Particulars(**ship["particulars"]),
         steering=SteeringGear(**ship["steering"]),
         coefficients=coefficients,
         provenance={"source": ship["source"]},
