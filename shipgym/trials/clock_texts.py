@@ -3,7 +3,6 @@
 import re
 import warnings
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -81,12 +80,6 @@ def _moments(series: Any, day_first: bool) -> Any:
 def is_dated(seconds: float) -> bool:
     """Return whether a time counts from 1970, not from midnight."""
     return bool(seconds > 2.0 * DAY)
-
-
-def clock_text(seconds: float) -> str:
-    """Write a time since 1970, or of the day, as ISO 8601 does."""
-    moment = datetime.fromtimestamp(round(seconds, 1), UTC)
-    return moment.strftime("%Y-%m-%d %H:%M:%S" if is_dated(seconds) else "%H:%M:%S")
 
 
 def spread_evenly(moments: Integers, t: Floats, tick: float, usual: int) -> Floats:

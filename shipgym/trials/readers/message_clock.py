@@ -12,7 +12,6 @@ from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.trials.clock_texts import (
     DAY,
-    clock_text,
     is_dated,
     read_clock,
     spread_evenly,
@@ -78,11 +77,11 @@ def _own_clock(path: Path, heard: Heard) -> Clock | None:
     goes_back = np.diff(t) < -5.0
     if goes_back.any():
         last = int(goes_back.argmax())
-        before, after = map(clock_text, t[last : last + 2])
+        back = t[last] - t[last + 1]
         raise InputError(
-            f"{path}: line {lines[last + 1]:.0f}: expected time to go on, got"
-            f" {after} after {before}; the clock was set back, or two logs are joined:"
-            " cut the log there"
+            f"{path}: line {lines[last + 1]:.0f}: expected time to go on, got one that"
+            f" goes back by {back:.6g} s; the clock was set back, or two logs are"
+            " joined: cut the log there"
         )
     return _increasing(t, lines, best)
 
