@@ -59,11 +59,11 @@ def _refuse_foreign(path: Path, content: bytes) -> None:
     """Refuse a file that is no log; name its kind, and the smallest step to a log."""
     beginning = content[:4096].decode("latin-1").lower()
     for kind in shipped_toml("shipgym.trials.readers", "foreign.toml")["kind"]:
-        magics = tuple(bytes.fromhex(magic) for magic in kind.get("magic", [""]))
+        magics = tuple(bytes.fromhex(magic) for magic in kind.get("magic", []))
         if (
             content.startswith(magics)
-            and re.match(kind.get("text", ""), beginning, re.DOTALL)
-            and path.name.lower().endswith(kind.get("ending", ""))
+            or re.match(kind.get("text", "(?!)"), beginning, re.DOTALL)
+            or path.suffix.lower() == kind.get("ending")
         ):
             step = kind["step"].replace("FILE", path.name)
             raise InputError(f"{path}: expected a log, got {kind['what']}; {step}")
