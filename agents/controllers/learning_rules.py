@@ -165,9 +165,9 @@ class Scenarios(LearningRule):
         """Other ships; those who have to give way weigh less."""
         first = self.places["others_0_bearing_sin"]
         seen = rows[:, first : first + 8 * 4]
-        seen = seen.reshape(len(rows), 1, 4, 8).transpose(3, 0, 1, 2)
+        seen = seen.reshape(len(rows), 4, 8).transpose(2, 1, 0)[..., None]
         on_bow = np.arctan2(seen[0], seen[1])
-        own = heading[:, None, None]
+        own = heading[:, None]
         bearing = own + on_bow
         course = own + np.arctan2(seen[3], seen[4])
         distance = 10.0 * seen[2]
@@ -220,9 +220,9 @@ class Scenarios(LearningRule):
         k = self.known
         wider = 1.0 + k.growth * time
         sailed = time * others.speed
-        north = north[..., None] - others.north
+        north = north - others.north
         north -= sailed * others.cosine
-        east = east[..., None] - others.east
+        east = east - others.east
         east -= sailed * others.sine
         ahead = north * others.cosine + east * others.sine
         abeam = east * others.cosine - north * others.sine
@@ -233,11 +233,11 @@ class Scenarios(LearningRule):
         close = 1.0 - distance / (wider * k.near)
         risk = k.ellipse * np.maximum(inside, 0.0) ** 2
         risk += k.danger * np.maximum(close, 0.0)
-        return (others.weight * risk).sum(axis=-1)
+        return (others.weight * risk).sum(axis=0)
 
 
 class Others(NamedTuple):
-    """Other ships, their places from here, shape (n, 1, 4)."""
+    """Other ships, their places from here, shape (4, n, 1)."""
 
     north: Any
     east: Any
