@@ -55,7 +55,7 @@ def case(name: str, structure: str, seed: int) -> Row:
     except InputError as error:
         return row | {"failed": str(error)}
     verified = partial(verify, fit.model, DRAWS, 0, designs=COMPARED, trials=fit.trials)
-    result = examined(None, fit, [], verified)
+    result = examined(None, fit, verified)
     row["chosen"] = fit.model.structure
 
     found = result.verification

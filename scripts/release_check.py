@@ -109,7 +109,7 @@ TRIED: dict[str, tuple[str | tuple[str, ...], ...]] = {
     "logs": (LOGS,),
     "rl": (("train", *LEARN, "--out", "run"),),
     "tune": (("tune", *LEARN, "--trials", "1", "--out", "study"),),
-    "ray": ((*BENCHMARK, "results", "--engine", "ray", "--no-page"),),
+    "ray": ((*BENCHMARK, "results", "--engine", "ray"),),
 }
 
 

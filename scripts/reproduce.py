@@ -36,17 +36,13 @@ def main(
         str | None,
         typer.Option(metavar="NAME", help='One table or figure, such as "Table 2".'),
     ] = None,
-    row: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help='One row, such as "X_uu: error, %".'),
-    ] = None,
 ) -> None:
     """Run the papers' tables: printed, their way, at best, and aims met."""
     names = papers_of(paper)
     # more threads wait for each other: three times the processor's time for the same
     with err.status("starting") as status, single_threaded():
         results = reproduce(names, tell=status.update)
-    results = chosen(results, table, row)
+    results = chosen(results, table)
     if markdown is not None:
         write_text(page(results), markdown)
     answer({name: [row.to_dict() for row in rows] for name, rows in results.items()})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -35,15 +34,12 @@ def autopilot_command(
     *,
     options: dict[str, Any],
     autopilots: Annotated[
-        str | None,
+        str,
         Option(
             metavar="NAMES",
-            help=(
-                "Autopilots to design; default: pid,lq,preview-lq. "
-                "Others: lqg, wheel-over, mpc."
-            ),
+            help="Autopilots to design. Others: lqg, wheel-over, mpc.",
         ),
-    ] = None,
+    ] = "pid,lq,preview-lq",
 ) -> None:
     """Go from trials to a report on autopilots.
 
@@ -57,11 +53,8 @@ def autopilot_command(
     from agents.cli.terminal import progress_bars
     from agents.output import present
     from agents.verification.chain import build_autopilot
-    from agents.verification.verify import DESIGNS
 
-    designs: Sequence[str] = DESIGNS
-    if autopilots is not None:
-        designs = [name.strip() for name in autopilots.split(",")]
+    designs = [name.strip() for name in autopilots.split(",")]
     try:
         with progress_bars():
             result = build_autopilot(

@@ -48,7 +48,6 @@ Runs = Annotated[
 Resume = Annotated[
     bool, Option("--resume", help="Continue in a folder with results or parts of them.")
 ]
-Page = Annotated[bool, Option("--page/--no-page", help="Write index.html.")]
 
 
 def benchmark_command(
@@ -63,7 +62,6 @@ def benchmark_command(
     episodes: Episodes = 100,
     seed: Seed = 0,
     runs: Runs = 1,
-    page: Page = True,
     allow_code: AllowCode = False,
 ) -> None:
     """Rank controllers on the tasks of a suite. All run the same episodes."""
@@ -97,8 +95,7 @@ def benchmark_command(
                 runs=runs,
                 allow_code=allow_code,
             )
-        if page:
-            write_page(result, out / "index.html")
+        write_page(result, out / "index.html")
     except KeyboardInterrupt:
         done = len(list((out / PARTS).glob("*.json")))
         if not done:

@@ -93,9 +93,8 @@ def interrupted(kept: str, *more: str) -> NoReturn:
 
     `kept`: ends before the command; `more`: words that the command needs now.
     """
-    given = GIVEN.get()
-    new = [word for word in more if word not in given]
-    command = shlex.join(["shipgym", *given, *new])
+    given = [word for word in GIVEN.get() if word not in more]
+    command = shlex.join(["shipgym", *given, *more])
     fail(f"interrupted; {kept}: {command}", INTERRUPTED)
 
 

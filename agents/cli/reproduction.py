@@ -29,9 +29,6 @@ def reproduce_command(
         str | None,
         Option(metavar="NAME", help='One table or figure, such as "Table 2".'),
     ] = None,
-    row: Annotated[
-        str | None, Option(metavar="NAME", help='One row, such as "X_uu: error, %".')
-    ] = None,
 ) -> None:
     """Reproduce the papers' tables.
 
@@ -42,7 +39,7 @@ def reproduce_command(
 
     folder = next(place for place in PLACES if place.is_dir())
     arguments = [sys.executable, str(folder / "reproduce.py"), paper]
-    options = {"--markdown": markdown, "--table": table, "--row": row}
+    options = {"--markdown": markdown, "--table": table}
     for option, value in options.items():
         if value is not None:
             arguments += [option, str(value)]

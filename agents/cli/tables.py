@@ -169,7 +169,6 @@ def criteria_notes(criteria: Mapping[str, Criterion]) -> list[str]:
     for name, criterion in criteria.items():
         if criterion.note:
             notes.append(f"{name}: {criterion.note}")
-    for name, criterion in criteria.items():
         drawn = criterion.drawn
         if drawn is not None and drawn.lost_in_words:
             lost = drawn.lost_in_words

@@ -12,7 +12,6 @@ from agents.cli.parameters import with_options
 
 if TYPE_CHECKING:
     from agents.training.evaluation import TrainingResult
-    from agents.training.plan import TrainingPlan
 
 Algorithm = Annotated[str, Argument(metavar="ALGORITHM", help="ppo or sac.")]
 Environment = Annotated[
@@ -114,25 +113,21 @@ def train_command(
     A run killed at any moment continues with the same command and --resume from its
     last save, about a minute old at most.
     """
-    from agents.training.plan import make_plan
-
-    plan = make_plan(**asked, seed=seed)
-    _print_result(_train(plan, out, resume), out)
-
-
-def _train(plan: TrainingPlan, out: Path, resume: bool) -> TrainingResult:
     from agents.cli.terminal import training_bar
+    from agents.training.plan import make_plan
     from agents.training.run_folder import RUN
     from agents.training.training import train
 
+    plan = make_plan(**asked, seed=seed)
     try:
         with training_bar() as on_progress:
-            return train(plan, out, resume=resume, on_progress=on_progress)
+            result = train(plan, out, resume=resume, on_progress=on_progress)
     except KeyboardInterrupt:
         if not (out / RUN).is_file():
             raise
         kept = "what was learned up to the last save"
         interrupted(f"{kept} is kept in {out}; go on with", "--resume")
+    _print_result(result, out)
 
 
 def _print_result(result: TrainingResult, out: Path) -> None:
@@ -148,17 +143,15 @@ def _print_result(result: TrainingResult, out: Path) -> None:
         "Mean cost of an episode held out, the lower the better", "", ">cost"
     )
     first, last, best = result.curve[0], result.curve[-1], result.best
-    costs = {
-        "before training": first["cost"],
-        f"best policy, step {best['steps']:,} of {last['steps']:,}": best["cost"],
-        **result.yardsticks,
-    }
+    policy = f"best policy, step {best['steps']:,} of {last['steps']:,}"
+    costs = {"before training": first["cost"], policy: best["cost"]}
+    costs |= result.yardsticks
     for name, cost in costs.items():
         table.add_row(name, f"{cost:.6g}")
     console.print(table)
-    others = {"the agent before training": first["cost"], **result.yardsticks}
-    name = min(others, key=lambda one: others[one])
-    if best["cost"] >= others[name]:
+    least = costs.pop(policy)
+    name = min(costs, key=costs.__getitem__)
+    if least >= costs[name]:
         say(
             f"the agent is no better than {name}: train it for more steps"
             " (--total-steps), or with other settings (--set)"

@@ -95,39 +95,29 @@ def examined(
     verified: Callable[[], Verification],
 ) -> AutopilotResult:
     """Result on an identified model: its verification, or why there is none."""
-
-    def result(
-        instability: str | None = None,
-        found: Verification | None = None,
-        refusal: str | None = None,
-    ) -> AutopilotResult:
-        return AutopilotResult(ship, fit.trials, fit, instability, found, refusal)
-
     instability = why_unstable(fit)
     if instability is not None:
-        return result(instability)
+        return AutopilotResult(ship, fit, instability)
     refusal = why_refused(fit)
     if refusal is not None:
-        return result(refusal=refusal)
+        return AutopilotResult(ship, fit, refusal=refusal)
     try:
         found = verified()
     except (UnstableModelError, InputError) as error:
         # the user's input was right, the model is not
-        return result(str(error))
+        return AutopilotResult(ship, fit, str(error))
 
-    found = _measured(found, fit)
-    refusals = refused_designs(found, fit)
-    refused = {**found.refused, **refusals.by_design}
-    run_next = refusals.run_next or trials_to_run(found.criteria)
-    of_all = refusals.of_all
-    found = replace(found, refused=refused, run_next="" if of_all else run_next)
-    return result(None, found, of_all)
-
-
-def _measured(found: Verification, fit: IdentificationResult) -> Verification:
-    """A verification with what the trials measured."""
     measured = measured_by(fit.model, fit.trials, fit.predictions)
-    return replace(found, criteria=with_measured(found.criteria, measured))
+    refusals = refused_designs(found, fit)
+    found = replace(
+        found,
+        criteria=with_measured(found.criteria, measured),
+        refused=found.refused | refusals.by_design,
+    )
+    if not refusals.of_all:
+        run_next = refusals.run_next or trials_to_run(found.criteria)
+        found = replace(found, run_next=run_next)
+    return AutopilotResult(ship, fit, None, found, refusals.of_all)
 
 
 def write_agents(result: AutopilotResult, folder: Path) -> None:

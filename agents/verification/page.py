@@ -55,7 +55,7 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
         refusal=result.refusal,
         step_deg=STEP_DEG,
         ship_file=result.ship.path.name,
-        trials=result.trials,
+        trials=result.identification.trials,
         **data,
     )
     write_text(page, Path(path))

@@ -20,7 +20,6 @@ from shipgym.models import ShipModel
 from shipgym.models.linear import Nomoto
 from shipgym.plots import Panel, draw
 from shipgym.trials.ship_file import ShipFile
-from shipgym.trials.trial import Trial
 
 STEP_DEG = 20.0
 
@@ -94,10 +93,11 @@ class AutopilotResult:
     """Everything in the report."""
 
     ship: ShipFile  # what was read
-    trials: tuple[Trial, ...]  # in the order of the file
-    identification: IdentificationResult  # the model and its predictions
-    instability: str | None  # why the model must not be used; None where it is stable
-    verification: Verification | None  # none where the model is unstable or refused
+    identification: IdentificationResult  # trials, model and its predictions
+    # why the model must not be used; None where it is stable
+    instability: str | None = None
+    # none where the model is unstable or refused
+    verification: Verification | None = None
     # why no autopilot is given although the model is stable, and what would help
     refusal: str | None = None
 

@@ -39,30 +39,25 @@ def reproduce(
 
 
 def chosen(
-    results: Mapping[str, Sequence[Row]], table: str | None, quantity: str | None
-) -> dict[str, list[Row]]:
-    """Rows of one table or figure, or of one quantity, or all of them.
+    results: Mapping[str, list[Row]], table: str | None
+) -> Mapping[str, list[Row]]:
+    """Rows of one table or figure, or all of them.
 
     Raises
     ------
     InputError
-        If no paper that was run has such a table or row; names the nearest.
+        If no paper that was run has such a table; names the nearest.
     """
-    rows = [row for of_paper in results.values() for row in of_paper]
-    for field, what, wanted in (
-        ("case", "table", table),
-        ("quantity", "row", quantity),
-    ):
-        if wanted is not None:
-            check_choice(
-                wanted, dict.fromkeys(getattr(row, field) for row in rows), what
-            )
-            rows = [row for row in rows if getattr(row, field) == wanted]
-    kept = {
-        name: [row for row in of_paper if row in rows]
-        for name, of_paper in results.items()
-    }
-    return {name: left for name, left in kept.items() if left}
+    if table is None:
+        return results
+    known = [row.case for of_paper in results.values() for row in of_paper]
+    check_choice(table, dict.fromkeys(known), "table")
+    kept = {}
+    for name, of_paper in results.items():
+        rows = [row for row in of_paper if row.case == table]
+        if rows:
+            kept[name] = rows
+    return kept
 
 
 def missed(results: Mapping[str, Sequence[Row]]) -> list[str]:

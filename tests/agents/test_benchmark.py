@@ -356,7 +356,7 @@ def own(tmp_path, monkeypatch):
 
 def test_a_suite_of_ones_own_is_run_as_a_shipped_one(own):
     words = ["--suite", "own.toml", "--controllers", "helm=my_helm:make,lq"]
-    words += ["--episodes", 2, "--workers", 2, "--out", "out", "--no-page"]
+    words += ["--episodes", 2, "--workers", 2, "--out", "out"]
     refused = shipgym(*words)
     assert (refused.exit_code, refused.stdout) == (2, "")
     assert "if you trust the suite: --allow-code" in refused.stderr

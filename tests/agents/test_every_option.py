@@ -70,18 +70,18 @@ LINES = (
     (f"tune ppo {TASK} --model mariner --out study2", 2),
     (
         "benchmark --controllers pid,lq --suite small.toml --tasks calm --episodes 2"
-        " --workers 1 --engine local --page --allow-code --seed 1 --runs 2"
+        " --workers 1 --engine local --allow-code --seed 1 --runs 2"
         " --out results",
         0,
     ),
     (
         "benchmark --controllers pid,lq --suite small.toml --tasks calm --episodes 2"
-        " --workers 1 --resume --no-page --seed 1 --runs 2 --out results",
+        " --workers 1 --resume --seed 1 --runs 2 --out results",
         0,
     ),
     ("benchmark --controllers pid --address 127.0.0.1:9 --out results2", 2),
     ("reproduce nobody --markdown tables.md", 2),
-    ("reproduce cao2015 --table nothing --row nothing", 2),
+    ("reproduce cao2015 --table nothing", 2),
     (
         f"identify ship.toml {LINEAR} --report --out reported",
         0,
@@ -168,7 +168,7 @@ def test_processes_of_a_command_take_no_modules_from_the_folder_of_data(
 ):
     monkeypatch.chdir(data)
     words = "benchmark --controllers pid,lq --suite small.toml --tasks calm"
-    more = "--episodes 1 --workers 2 --no-page --out in-processes"
+    more = "--episodes 1 --workers 2 --out in-processes"
     answer = run(*shlex.split(words), *shlex.split(more))
     assert answer.returncode == 0, answer.stderr
     assert not (data / "RAN").exists(), (data / "RAN").read_text()

@@ -115,7 +115,7 @@ def test_the_report_tells_what_the_metrics_hold(chain, page):
     assert f"{metrics['ranking'][0].upper()} steers best" in text
     for name in chain[1].model.coefficients:
         assert name in text
-    for trial in chain[1].trials:
+    for trial in chain[1].identification.trials:
         assert trial.name in text
     assert "estimated" in text
 
@@ -184,15 +184,15 @@ def test_hostile_names_of_ship_trials_and_autopilots_stay_text(chain, tmp_path):
     """Escaped in the page's text, and unable to end the scripts that draw
     the figures."""
     result = chain[1]
+    fit = result.identification
     ship = replace(
         result.ship, particulars=replace(result.ship.particulars, name=HOSTILE)
     )
     trials = tuple(
         Trial(one.t, one.channels, name=f"{HOSTILE}{k}", kind=one.kind, use=one.use)
-        for k, one in enumerate(result.trials)
+        for k, one in enumerate(fit.trials)
     )
-    names = {old.name: new.name for old, new in zip(result.trials, trials, strict=True)}
-    fit = result.identification
+    names = {old.name: new.name for old, new in zip(fit.trials, trials, strict=True)}
     metrics = {
         "trials": {names[name]: found for name, found in fit.metrics["trials"].items()}
     }
@@ -204,7 +204,6 @@ def test_hostile_names_of_ship_trials_and_autopilots_stay_text(chain, tmp_path):
     hostile = replace(
         result,
         ship=ship,
-        trials=trials,
         verification=found,
         identification=replace(
             fit, metrics=metrics, predictions=predictions, trials=trials

@@ -47,17 +47,11 @@ def row(printed, ours, best=None, met=None, quantity="K"):
     return Row("Table 1", quantity, printed, ours, best, "", met)
 
 
-@pytest.mark.parametrize(
-    ("options", "nearest"),
-    [
-        (["--table", "Table 22"], "Table 2"),
-        (["--row", "X_u: eror, %"], "X_u: error, %"),
-    ],
-)
-def test_a_table_or_row_that_is_not_there_gets_one_message(options, nearest):
-    answer = CliRunner().invoke(reproduce.app, ["cao2015", *options])
+def test_a_table_that_is_not_there_gets_one_message():
+    words = ["cao2015", "--table", "Table 22"]
+    answer = CliRunner().invoke(reproduce.app, words)
     assert answer.exit_code == 2
-    assert f"Did you mean '{nearest}'" in " ".join(answer.stderr.split())
+    assert "Did you mean 'Table 2'" in " ".join(answer.stderr.split())
 
 
 def test_one_table_of_a_paper():
