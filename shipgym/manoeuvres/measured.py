@@ -29,6 +29,7 @@ from shipgym.manoeuvres.imo_rules import RULES, Rule
 from shipgym.manoeuvres.turning import full_rudder_deg, turning_indices
 from shipgym.manoeuvres.zigzags import (
     STANDARD_DEG,
+    course_error_deg,
     switch_heading_deg,
     zigzag_indices,
 )
@@ -139,7 +140,7 @@ def _with_errors(
     side = first_side(trial)
     for name, value in values.items():
         scatter = np.std([again.get(name, value) for again in repeated])
-        unseen = _unseen_error(model, trial, noise, rules[name])
+        unseen = _unseen_error(model, smooth, noise, rules[name])
         found[name] = MeasuredIndex(value, float(np.hypot(scatter, unseen)), side)
     return found
 
@@ -231,11 +232,12 @@ def _unseen_error(
 ) -> float:
     """Error of an index that repeated noise does not show.
 
-    Of lengths: the order is known to one sample, and satellite positions wander slowly,
-    by about twice their noise.
+    Of headings: the helmsman counted from a course of his own near that of the
+    approach. Of lengths: the order is known to one sample, and satellite positions
+    wander slowly, by about twice their noise.
     """
     if rule.unit == "deg":
-        return 0.0
+        return course_error_deg(trial)
     length = model.particulars["length"]
     step = _step(trial.t)
     speed = model.particulars["speed"]

@@ -171,7 +171,8 @@ def switch_heading_deg(trial: Trial) -> float | None:
     Orders are given in whole degrees, in trials nearly always 1 or a multiple of 5, and
     carried out after a delay in which the heading moves on. So it is the largest such
     angle that had been reached, to 5 per cent, at the first reversal; where that lies
-    more than 3 degrees back, the heading of the reversal itself.
+    more than 3 degrees back, the heading of the reversal itself. Where orders are
+    recorded, it was reached in the sampling step of the first reversal.
     """
     start, turns = reversals(trial)
     if not turns:
@@ -181,18 +182,29 @@ def switch_heading_deg(trial: Trial) -> float | None:
     around = _heading_change(trial, start, [turn - step, turn])
     changes_deg = np.degrees(np.abs(around))
     before, at = sorted(changes_deg.tolist())
+    usual = [1.0, *range(5, 95, 5)]
     if is_ordered(trial):
-        slack = 1e-6
-        whole = float(np.floor(at + slack))
-        if whole >= before - slack:  # passed within the step
-            return whole
+        slack = 1e-6 + 3.0 * course_error_deg(trial)
+        whole = float(np.floor(at + 1e-6))
+        for angle in (*reversed(usual), whole):
+            if before - slack <= angle <= at + slack:
+                return float(angle)
         return float(0.5 * (before + at))
 
-    usual = [1.0, *range(5, 95, 5)]
     passed = [float(angle) for angle in usual if 0.95 * angle <= at]
     if passed and at - passed[-1] < 3.0:
         return passed[-1]
     return float(at)
+
+
+def course_error_deg(trial: Trial) -> float:
+    """Standard deviation of the heading up to the first order, degrees.
+
+    So well is the course known from which the helmsman counted.
+    """
+    start, _ = reversals(trial)
+    approach = trial["psi"][trial.t <= start]
+    return float(np.degrees(np.std(approach)))
 
 
 def _sampling_step(trial: Trial, time: float) -> float:

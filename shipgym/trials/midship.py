@@ -80,8 +80,8 @@ def _to_midship(
     """Move GNSS positions and velocities to midship and derive surge and sway.
 
     Velocity over ground gives u and v, else positions; a speed through the water takes
-    the place of u, and the current that it shows is taken out of v. Raises InputError
-    for GNSS without a heading.
+    the place of u, and the current that it shows is taken out of v, x and y. Raises
+    InputError for GNSS without a heading.
     """
     channels = log.channels
     is_moved = log.has("x", "y") and not installation.is_at_midship
@@ -105,8 +105,14 @@ def _to_midship(
         return
     u, v = velocity
     if water is not None and not log.magnetic:
+        north, east = _current_by_log(log, water, u, v)
         # leeway is what is left of the sway without the current
-        v = _sway_through_water(log, water, u, v)
+        _, across = rotate_to_body(north, east, channels["psi"])
+        v = v - across
+        time = log.t - log.t[0]
+        for name, speed in (("x", north), ("y", east)):
+            if log.has(name):
+                channels[name] = channels[name] - speed * time
     for name, values in (("u", u), ("v", v)):
         if not log.has(name):
             log.derive(name, values)
@@ -128,8 +134,10 @@ def _velocity(log: Log, installation: Installation) -> tuple[Floats, Floats] | N
     return u, v
 
 
-def _sway_through_water(log: Log, water: Floats, u: Floats, v: Floats) -> Floats:
-    """Sway over ground less the current that a speed log shows; adds a note of it.
+def _current_by_log(
+    log: Log, water: Floats, u: Floats, v: Floats
+) -> tuple[float, float]:
+    """Current that a speed log shows, north and east, m/s; adds a note of it.
 
     The current explains best the difference of both speeds along the ship; on nearly
     one course the part across is taken from the mean sway, as if there were no leeway.
@@ -151,7 +159,6 @@ def _sway_through_water(log: Log, water: Floats, u: Floats, v: Floats) -> Floats
     log.notes.append(
         "set and drift by the speed log against the ground:"
         f" {set_and_drift(north, east)}, {unexplained:.2f} m/s unexplained; removed"
-        " from the sway"
+        " from the sway and the track"
     )
-    _, sway = rotate_to_body(north, east, psi)
-    return np.asarray(v - sway)
+    return north, east
