@@ -66,6 +66,11 @@ def identify_command(
         console.print(selection_table(result.metrics["selection"]))
         for name, reason in result.metrics["selection"]["refused"].items():
             say(f"{name} was not fitted: {reason}")
+        for name, share in result.metrics["selection"]["passed_over"].items():
+            say(
+                f"{name} was passed over: {share:.0%} of the ships drawn from it run"
+                " away in a hard turn"
+            )
     if instability is None:
         say(result.summary())
         console.print(prediction_table(result))

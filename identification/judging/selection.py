@@ -15,6 +15,7 @@ import numpy as np
 
 from identification.arrays import root_mean_square
 from identification.judging.hard_turn import hardest
+from identification.models.guard import hard_turns, why_unphysical
 from identification.models.sailed import least_scales
 from identification.samples.prediction import predict
 from identification.samples.preprocess import noise_level
@@ -139,6 +140,20 @@ def piece_errors(
         pieces = np.array_split(error, n_pieces)
         found[name] = [max(root_mean_square(own) / noise, 1.0) for own in pieces]
     return found
+
+
+def share_that_runs_away(model: ShipModel) -> float:
+    """Share of the ships drawn from a model that run away in a hard turn."""
+    if model.covariance is None and model.draws is None:
+        return 0.0
+    draws = model.sample(40, 0)
+    lost = 0
+    for draw in draws:
+        causes = (
+            why_unphysical(draw, sail, least) for _, sail, least in hard_turns(draw)
+        )
+        lost += any(causes)
+    return lost / len(draws)
 
 
 def simplest(ranked: Sequence[RankedFit]) -> RankedFit:

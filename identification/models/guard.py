@@ -86,7 +86,7 @@ def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
     and rudder reversed at intervals, from short to long, which excites what a zigzag of
     any other angle would. Stops after the first kind in which it does.
     """
-    for kind in (_recorded(model, trials), _turns(model), _reversals(model)):
+    for kind in (_recorded(model, trials), hard_turns(model), _reversals(model)):
         reasons = []
         for name, sail, least_surge in kind:
             cause = why_unphysical(model, sail, least_surge)
@@ -103,7 +103,8 @@ def _recorded(model: ShipModel, trials: Sequence[Trial]) -> Iterator[Simulation]
         yield name, partial(open_loop, model, trial), min(float(trial["u"].min()), 0.0)
 
 
-def _turns(model: ShipModel) -> Iterator[Simulation]:
+def hard_turns(model: ShipModel) -> Iterator[Simulation]:
+    """Turning circles to both sides, by much and by little rudder."""
     duration = DURATION_LENGTHS * model.travel_time
     dt = STEP * model.travel_time
     for angle in _angles_deg(model):

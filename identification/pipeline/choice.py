@@ -15,6 +15,7 @@ from identification.judging.selection import (
     RankedFit,
     fit_name,
     rank_by_likelihood,
+    share_that_runs_away,
     simplest,
 )
 from identification.models.guard import GuardedFit, reasons_unstable
@@ -66,6 +67,8 @@ STRUCTURES = (*TABLES, GREY_BOX, MMG)
 RM_SVM = "rm-svm"
 #: Tables that are fitted by output error, too, where they predict best by regression.
 REFINED = ("linear-steering", "steering7", "abkowitz", "cubic")
+#: Share of the ships drawn from a choice that may run away in a hard turn.
+MOST_THAT_RUN_AWAY = 0.25
 
 
 class Choice(NamedTuple):
@@ -85,7 +88,9 @@ def select(trials: Sequence[Trial], options: Options) -> Choice:
     trials of less rudder. Candidates are compared by the likelihood of all channels
     that were measured (`judging.selection`). Those that run away in a hard turn are
     last. The choice is the one with the fewest coefficients within one standard error
-    of the paired difference from the best. A method other than the default is the only
+    of the paired difference from the best; one is passed over where a quarter of the
+    ships drawn from it run away in a hard turn, as the trials do not tell so many
+    coefficients. A method other than the default is the only
     one, and what does not know a setting is refused; InputError where nothing can be
     fitted, with the first reason.
     """
@@ -106,12 +111,14 @@ def select(trials: Sequence[Trial], options: Options) -> Choice:
         attempts.add(tables[0].structure, Refinement())
 
     ranked = attempts.by_rank()
-    best = simplest(ranked)
+    passed_over = dict[str, float]()
+    best = attempts.usable(ranked, passed_over)
     others = [other for other in ranked if other is not best]
     report = {
         "held_out": held_out,
         "ranking": [one.plain() for one in (best, *others)],
         "refused": attempts.refused,
+        "passed_over": passed_over,
     }
     own, whole = attempts.fits[fit_name(best.structure, best.method)]
     if single:
@@ -172,6 +179,26 @@ class _Attempts:
             self.refused[name] = str(error)
         else:
             self.fits[name] = own, found
+
+    def usable(
+        self, ranked: Sequence[RankedFit], passed_over: dict[str, float]
+    ) -> RankedFit:
+        """The simplest of the best whose draws are ships; if none has, of all.
+
+        `passed_over` gets the others by name, and the share of draws that run away.
+        """
+        left = [*ranked]
+        while left:
+            best = simplest(left)
+            name = fit_name(best.structure, best.method)
+            own, whole = self.fits[name]
+            share = share_that_runs_away(whole.result(own).model)
+            if share < MOST_THAT_RUN_AWAY:
+                return best
+            passed_over[name] = share
+            left.remove(best)
+        passed_over.clear()
+        return simplest(ranked)
 
     def by_rank(self) -> list[RankedFit]:
         """The fits, the best first."""

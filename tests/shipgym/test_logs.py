@@ -69,3 +69,24 @@ def test_the_real_log_is_read_and_says_that_it_has_no_rudder():
     notes = " ".join(trial.notes)
     assert "no rudder angle in this log: without rudder nothing" in notes
     assert "set and drift" in notes
+
+
+def test_a_current_that_a_speed_log_shows_is_taken_out_of_the_track():
+    north, east = 0.5, -0.4
+    through = (FRAME.u + 1j * FRAME.v) * np.exp(1j * PSI)
+    over = through + north + 1j * east
+    steps = 0.5 * (through[1:].to_numpy() + through[:-1].to_numpy())
+    place = np.concatenate([[0.0], np.cumsum(steps)])
+    drifted = place + (north + 1j * east) * np.arange(240.0)
+    frame = FRAME[["time", "psi", "delta"]].assign(
+        x=drifted.real,
+        y=drifted.imag,
+        sog=np.abs(over),
+        cog=np.angle(over),
+        stw=FRAME.u,
+    )
+    names = ("psi", "delta", "x", "y", "sog", "cog", "stw")
+    trial = Trial.from_frame(frame, {"t": "time"} | {name: name for name in names})
+    assert "removed from the sway and the track" in " ".join(trial.notes)
+    np.testing.assert_allclose(trial["v"], FRAME.v, atol=0.01)
+    np.testing.assert_allclose(trial["x"] + 1j * trial["y"], place, atol=2.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from sensors import Sensors
 
-from shipgym import InputError, UnstableModelError, load_model
+from shipgym import InputError, Trial, UnstableModelError, load_model
 from shipgym.manoeuvres import (
     Criterion,
     IndexInterval,
@@ -139,6 +139,22 @@ def test_what_noisy_trials_measure_is_not_high_and_has_its_error():
         offs.append((found.value - own) / found.error)
     assert abs(np.mean(offs)) < 1.0
     assert np.sqrt(np.mean(np.square(offs))) < 2.0
+
+
+def test_an_overshoot_is_known_as_well_as_the_course_of_the_approach():
+    ship = load_model("container")
+    run = zigzag(ship, 10, 10, duration=500.0, dt=1.0)
+    before = np.arange(60)
+    channels = {
+        name: np.concatenate([np.full(60, values[0]), values])
+        for name, values in ((name, run[name]) for name in ("psi", "u", "v", "delta"))
+    }
+    channels["delta"][:60] = 0.0
+    channels["psi"][:60] += np.radians(0.4 * np.sin(0.1 * before))
+    t = np.arange(60 + len(run), dtype=float)
+    wandering = Trial(t, channels, kind="zigzag")
+    index = measured_indices(ship, wandering)["overshoot_1_10_10"]
+    assert index.error == pytest.approx(0.4 / np.sqrt(2.0), abs=0.08)
 
 
 def test_a_measured_manoeuvre_goes_before_the_model(of_zigzags):
