@@ -14,7 +14,7 @@ import argparse
 from dataclasses import asdict
 from typing import Any
 
-from agents.suites.suite import DEFAULT_SUITE, load_suite, load_tuned, suite_file
+from agents.suites.suite import DEFAULT_SUITE, load_suite, load_tuned, tuned_file
 from agents.training.controller_search import SearchBudget, tune_controller
 from shipgym.envs.engine import Engine
 from shipgym.files import write_json
@@ -34,7 +34,7 @@ def main() -> None:
     given = parser.parse_args()
     budget = SearchBudget(3600.0, given.candidates, given.episodes)
     suite = load_suite(given.suite)
-    path = suite_file(suite.source, "tuned")
+    path = tuned_file(suite.source)
     known = load_tuned(suite.source) if path.exists() else {}
     for task in suite.select(given.tasks):
         kinds = given.controllers.split(",")

@@ -46,7 +46,7 @@ from agents.controllers.registry import (
 )
 from agents.controllers.task_rule import TaskRule
 from agents.suites.environments import import_named
-from agents.suites.suite import BenchmarkTask, suite_file
+from agents.suites.suite import BenchmarkTask, tuned_file
 from shipgym import load_model
 from shipgym.checks import did_you_mean, quoted
 from shipgym.envs.engine import Engine
@@ -341,7 +341,7 @@ def source_files(text: str, task: BenchmarkTask) -> list[Path]:
         return [Path(str(_module(text).__file__))]
     kept = {SHIPPED: PRETRAINED / f"{task.environment}-{text}.json"}
     if text.startswith(TUNED):
-        kept[text] = suite_file(task.suite, "tuned")
+        kept[text] = tuned_file(task.suite)
     if text in known_names():
         path = kept.get(text)
         return [path] if path and path.is_file() else []

@@ -43,16 +43,11 @@ def reproduce_command(
     for option, value in options.items():
         if value is not None:
             arguments += [option, str(value)]
-    as_json = AS_JSON.get()
-    if as_json:
+    if AS_JSON.get():
         arguments.append("--json")
-    is_silent = console.quiet and not as_json
+    elif console.quiet:
+        arguments.append("--quiet")
     # Python finds what the program imports in the program's own folder
     environment = {**os.environ, "PYTHONSAFEPATH": ""}
-    done = subprocess.run(
-        arguments,
-        env=environment,
-        stdout=subprocess.DEVNULL if is_silent else None,
-        check=False,
-    )
+    done = subprocess.run(arguments, env=environment, check=False)
     raise typer.Exit(done.returncode)

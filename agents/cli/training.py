@@ -213,6 +213,4 @@ def print_tuning(study: Any, out: Path) -> None:
         f"lowest mean cost of a held-out episode: {costs[0]}, trial {best.number} of"
         f" {len(trials)}; {costs[1]} with the settings as they were"
     )
-    for name, value in best.params.items():
-        say(f"  {name} = {value}")
     say(f"written: {path}")

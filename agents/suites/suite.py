@@ -40,7 +40,7 @@ __all__ = [
     "load_suite",
     "load_tuned",
     "parse_suite",
-    "suite_file",
+    "tuned_file",
 ]
 
 DEFAULT_SUITE = "shipgym-v1"
@@ -131,15 +131,15 @@ def find_task(name: str) -> BenchmarkTask:
     return load_suite().task(name).design_task
 
 
-def suite_file(suite: str, what: str) -> Path:
-    """Return the path of a file that is kept beside a suite; it need not exist.
+def tuned_file(suite: str) -> Path:
+    """Return the path of the tuned settings beside a suite; it need not exist.
 
-    `suite` is a `Suite.source`, the file's name is NAME-`what`.json.
+    `suite` is a `Suite.source`, the file's name is NAME-tuned.json.
     """
     if suite.endswith(".toml"):
         path = Path(suite)
-        return path.with_name(f"{path.stem}-{what}.json")
-    return FOLDER / f"{suite}-{what}.json"
+        return path.with_name(f"{path.stem}-tuned.json")
+    return FOLDER / f"{suite}-tuned.json"
 
 
 def load_tuned(suite: str) -> dict[str, dict[str, Any]]:
@@ -149,7 +149,7 @@ def load_tuned(suite: str) -> dict[str, dict[str, Any]]:
     `settings`, `cost`, `start_cost`, `evaluations`. `suite`: a `Suite.source`. Raises
     InputError if the suite has none, or the file is broken.
     """
-    path = suite_file(suite, "tuned")
+    path = tuned_file(suite)
     remedy = "make it again with scripts/tune_controllers.py"
     content = read_json(path, "file of tuned settings", remedy)
     return dict(check_table(content.get("tasks"), f"{path}: tasks"))

@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from agents.controllers.registry import controller_class, controller_kinds
-from agents.identifying import identification_settings, trials_of
+from agents.identifying import identification_settings, identify_ship
 from agents.output import present, whole_folder
 from agents.verification.refusal import refused_designs, why_refused
 from agents.verification.result import AutopilotResult, Pilot, Verification
 from agents.verification.tracks import Track
 from agents.verification.verify import DESIGNS, verify
-from identification import IdentificationResult, identify
+from identification import IdentificationResult
 from identification.judging.warnings import why_unstable
 from identification.progress import PROGRESS
-from shipgym.checks import check_number, placed
+from shipgym.checks import check_number
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.files import write_json
 from shipgym.manoeuvres.criteria import trials_to_run, with_measured
@@ -61,12 +61,10 @@ def build_autopilot(
     files = (*FILES, *(f"{kind}.json" for kind in controller_kinds()))
     folder = Path(out)
     with whole_folder(folder, files) as draft:
-        with stage("reading trials"):
+        with stage("identifying"):
             ship = ShipFile.load(ship_file)
             settings = identification_settings(ship, options or {})
-            trials, arguments = trials_of(ship, settings)
-        with stage("identifying"), placed(str(ship.path)):
-            fit = identify(trials, **arguments)
+            fit = identify_ship(ship, settings)
 
         def verified() -> Verification:
             if not present(folder):  # an interruption leaves the model there

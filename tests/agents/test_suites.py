@@ -17,7 +17,7 @@ from agents.suites.suite import (
     load_suite,
     load_tuned,
     parse_suite,
-    suite_file,
+    tuned_file,
 )
 from shipgym import InputError, load_model
 from tests.agents.small_suite import TEXT as SMALL
@@ -117,7 +117,7 @@ def test_shipped_suites_are_known_by_name():
     assert (SHIPPED.name, SHIPPED.source) == ("shipgym-v1", "shipgym-v1")
     assert load_suite("shipgym-v1") is SHIPPED
     assert len(SHIPPED.sha256) == 64
-    assert suite_file("shipgym-v1", "tuned").is_file()
+    assert tuned_file("shipgym-v1").is_file()
     said = "suite: expected one of .* a TOML file, got 'shipgym-v2'.*'shipgym-v1'"
     with pytest.raises(InputError, match=said):
         load_suite("shipgym-v2")
