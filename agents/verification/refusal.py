@@ -4,7 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from agents.controllers.controller import Controller
 from agents.rollouts.course_keeping import Episodes
+from agents.training.controller_search import has_margin
 from agents.verification.closed_loop import loses_too_many
 from agents.verification.result import Verification
 from agents.verification.tracks import Track
@@ -55,10 +57,10 @@ class Refusals(NamedTuple):
 
 
 def refused_designs(found: Verification, fit: Fit) -> Refusals:
-    """The designs that lose control of too many models drawn, and what would help."""
+    """The designs that may lose control, and the trial that would help most."""
     lost = {}
     for pilot in found.pilots:
-        why = lost_control(found, pilot.episodes)
+        why = lost_control(found, pilot.episodes) or lacking_margin(pilot.controller)
         if why is not None:
             lost[pilot.key] = why
     tracks = {}
@@ -94,6 +96,17 @@ def lost_control(found: Verification, episodes: Episodes) -> str | None:
     if found.left_out:
         why += f"; {found.left_out} more run away whatever steers them"
     return why
+
+
+def lacking_margin(controller: Controller) -> str | None:
+    """Reason to refuse a design that hunts on a ship slightly unlike the model."""
+    if has_margin(controller):
+        return None
+    margins = controller.margins
+    return (
+        "expected a gain margin of 1.5 and a phase margin of 20 deg on the identified"
+        f" model, got {margins.gain_margin:.3g} and {margins.phase_margin_deg:.3g} deg"
+    )
 
 
 def lost_track(track: Track) -> str | None:

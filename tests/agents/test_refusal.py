@@ -77,6 +77,18 @@ def test_a_refusal_says_how_often_which_models_were_lost_and_when(chain):
     assert lost_control(others, episodes) is None
 
 
+def test_a_design_with_little_margin_is_refused(chain, fit):
+    found = chain[1].verification
+    (first, *others) = found.pilots
+    margins = replace(first.controller.margins, gain_margin=1.4)
+    hunting = replace(first, controller=replace(first.controller, margins=margins))
+    refused = refused_designs(replace(found, pilots=[hunting, *others]), fit)
+    assert refused.by_design == {
+        first.key: "expected a gain margin of 1.5 and a phase margin of 20 deg on the"
+        f" identified model, got 1.4 and {margins.phase_margin_deg:.3g} deg"
+    }
+
+
 def test_a_model_that_gathers_speed_or_runs_away_in_a_trial_is_not_the_ship(fit):
     trials = [trial for trial in fit.trials if trial.use == "fit"]
     assert is_possible(fit.model, trials)
