@@ -42,7 +42,11 @@ def identify_command(
     from agents.cli.terminal import answer, console, progress_bars, say
     from agents.identifying import identify_ship
     from agents.output import whole_folder
-    from identification.judging.warnings import held_out_error, why_unstable
+    from identification.judging.warnings import (
+        held_out_error,
+        why_unstable,
+        without_indices,
+    )
     from identification.pipeline.result import FILES
 
     read, settings = _chosen(ship, options)
@@ -74,7 +78,7 @@ def identify_command(
     if instability is None:
         say(result.summary())
         console.print(prediction_table(result))
-        say(held_out_error(result))
+        say(*without_indices(result), held_out_error(result))
     say(f"\nwritten to {out}: {', '.join(written)}")
     _check_stable(result)
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from shipgym.checks import check_choice, check_number, check_whole
+from shipgym.checks import bounded, check_choice, check_whole, keep_numbers
 
 
 @dataclass(frozen=True)
@@ -27,20 +27,12 @@ class KernelResidual:
 
     kernel: str = "rbf"
     centres: int = 64
-    length: float | None = None
-    C: float | None = None
+    length: float | None = bounded(None, above=0.0)
+    C: float | None = bounded(None, above=0.0)
 
     def __post_init__(self) -> None:
         from shipgym.ships.kernel_boxes import RBF, SIZES  # most runs have no kernel
 
         check_choice(self.kernel, (RBF,), "kernel")
-        check_whole(
-            self.centres,
-            "centres",
-            at_least=2,
-            at_most=SIZES[-1],
-        )
-        if self.length is not None:
-            check_number(self.length, "length", above=0.0)
-        if self.C is not None:
-            check_number(self.C, "C", above=0.0)
+        check_whole(self.centres, "centres", at_least=2, at_most=SIZES[-1])
+        keep_numbers(self)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from identification.arrays import column_rms, root_mean_square
+from identification.arrays import column_rms, root_mean_square, rounded
 from identification.samples.prediction import predict
 from identification.samples.problem import largest_rudders
 from shipgym import InputError, ManoeuvreError, ShipModel, Trial, UnstableModelError
@@ -141,14 +141,25 @@ def with_growing_terms(model: ShipModel, error: float) -> ShipModel:
     own = 0.0 if turn is None else turn.deviation
     lacking = math.sqrt(max(due**2 - own**2, 0.0))
     share = 0.7  # of that, which each of the two has
-    covariance = np.array(model.covariance)
+    units = np.eye(len(model.coefficients))
     for name in ("N_vvr", "X_rr"):
-        place = list(model.coefficients).index(name)
-        step = 0.01 * np.eye(len(covariance))[place]  # coefficients are of size 0.1
+        unit = units[list(model.coefficients).index(name)]
+        step = 0.01 * unit  # coefficients are of size 0.1
         slope = (_log_angle(model, step) - _log_angle(model, -step)) / 0.02
         if slope and math.isfinite(slope):
-            covariance[place, place] += (share * lacking / slope) ** 2
-    return replace(model, covariance=covariance)
+            model = spread(model, share * lacking / slope * unit)
+    return model
+
+
+def spread(model: ShipModel, along: Floats) -> ShipModel:
+    """The model with a deviation more of its coefficients, and of draws that it has."""
+    draws = model.draws
+    if draws is not None:
+        # other normal numbers for each coefficient that moves
+        rng = np.random.default_rng(int(np.abs(along).argmax()))
+        draws = rounded(draws + np.outer(rng.standard_normal(len(draws)), along))
+    covariance = np.asarray(model.covariance) + np.outer(along, along)
+    return replace(model, covariance=covariance, draws=draws)
 
 
 def widened(model: ShipModel, deviation: float) -> ShipModel:
@@ -160,13 +171,7 @@ def widened(model: ShipModel, deviation: float) -> ShipModel:
     if turn is None or turn.deviation >= deviation:
         return model
     ratio = deviation / turn.deviation
-    added = ratio**2 - 1.0
-    along = np.outer(turn.direction, turn.direction)
-    covariance = np.asarray(model.covariance) + added * along
-    return replace(
-        model,
-        covariance=covariance,
-    )
+    return spread(model, math.sqrt(ratio**2 - 1.0) * turn.direction)
 
 
 def hard_turn(model: ShipModel) -> HardTurn | None:

@@ -8,6 +8,7 @@ standard errors are scaled until these errors are of size one.
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -22,6 +23,7 @@ from identification.samples.prediction import (
     predict,
     predicted_channels,
     predicts_track,
+    with_start,
 )
 from identification.samples.preprocess import noise_level, smoothed_channels
 from shipgym import ShipModel, Trial, UnstableModelError
@@ -169,32 +171,32 @@ def motion_errors(
     None where the model or most draws fail. What a structure has no equation of, such
     as the speed in a structure of yaw, is no error of its coefficients.
     """
-    predicted = predict(own, clean)
-    runs = _runs([(draw, clean) for draw in drawn])
-    if predicted is None or len(runs) < DRAWS / 2:
+    begun = with_start(own, trial) if "psi" in trial else clean
+    predicted = _runs([own], begun)
+    runs = _runs(drawn, begun)
+    if not predicted or len(runs) < DRAWS / 2:
         return []
 
     names = counted_channels(own, trial)
     levels = {name: noise_level(trial.t, trial[name]) for name in names}
-    # smoothing leaves the start known to half the noise of a channel
-    shifted = _runs(
-        [
-            (own, clean.with_channels({name: clean[name] + 0.5 * level}))
-            for name, level in levels.items()
-            if level
-        ]
-    )
-    noisy = _with_noisy_rudder(own, clean)
+    shifted = list[Trial]()
+    if "psi" in levels and "r" in trial.derived:
+        # the yaw rate of a start that is estimated from headings
+        error = levels["psi"] / own.travel_time
+        shifted = _runs([own], begun.with_channels({"r": begun["r"] + error}))
+    noisy = _with_noisy_rudder(own, begun)
     # where the heading is differentiated, jitter of the clock is in its noise already
     timing = 0.0 if "r" in trial.derived else _timing(trial)
     found = []
     for name, level in levels.items():
-        mine = predicted[name]
+        mine = predicted[0][name]
         scatter = np.array([run[name] for run in runs]) - mine
         variance = float(np.mean(_robust_variance(scatter)))
         if variance <= 0.0:
             continue
-        noise = level**2 + mean_square(timing * np.gradient(clean[name], clean.t))
+        # the level is known to a tenth
+        noise = (1.1 * level) ** 2
+        noise += mean_square(timing * np.gradient(clean[name], clean.t))
         noise += sum(mean_square(run[name] - mine) for run in shifted)
         noise += sum(mean_square(run[name] - mine) for run in noisy) / RUDDERS
         square = mean_square(mine - trial[name])
@@ -215,26 +217,31 @@ def counted_channels(model: ShipModel, trial: Trial) -> list[str]:
     return names
 
 
-def _runs(cases: Sequence[tuple[ShipModel, Trial]]) -> list[Trial]:
-    """Predictions of trials by models, of those that do not run away."""
-    runs = [predict(*case) for case in cases]
-    return [run for run in runs if run is not None]
+def _runs(models: Sequence[ShipModel], trial: Trial) -> list[Trial]:
+    """Simulations of a trial from its first samples, of those that do not run away."""
+    found = []
+    for model in models:
+        with suppress(UnstableModelError):
+            found.append(open_loop(model, trial))
+    return found
 
 
-def _with_noisy_rudder(own: ShipModel, clean: Trial) -> list[Trial]:
+def _with_noisy_rudder(own: ShipModel, trial: Trial) -> list[Trial]:
     """Predictions with the noise of the logged rudder once more.
 
     It makes the heading walk off, which is no error of the model.
     """
-    delta = clean["delta"]
-    level = noise_level(clean.t, delta)
+    delta = trial["delta"]
+    level = noise_level(trial.t, delta)
     smallest = math.radians(0.01)
-    if level < smallest or "r" not in clean.derived:
+    if level < smallest or "r" not in trial.derived:
         return []
     rng = np.random.default_rng(0)
     noise = level * rng.standard_normal((RUDDERS, len(delta)))
-    noisy = [clean.with_channels({"delta": delta + error}) for error in noise]
-    return _runs([(own, trial) for trial in noisy])
+    found = list[Trial]()
+    for error in noise:
+        found += _runs([own], trial.with_channels({"delta": delta + error}))
+    return found
 
 
 def _robust_variance(scatter: Floats) -> Floats:
@@ -301,19 +308,10 @@ def with_sound_draws(model: ShipModel, trials: Sequence[Trial]) -> ShipModel:
 
     The log itself rejects those: no such ship sailed it. The covariance stays.
     """
-
-    def sails(draw: ShipModel) -> bool:
-        try:
-            for trial in trials:
-                open_loop(draw, trial)
-        except UnstableModelError:
-            return False
-        return True
-
     if type(model.dynamics) is not Structure:
         return model
     whole = model.sample(128, 0)
-    drawn = [draw for draw in whole if sails(draw)]
+    drawn = [draw for draw in whole if all(_runs([draw], trial) for trial in trials)]
     if not 0.5 * len(whole) <= len(drawn) < len(whole):
         return model
     draws = np.array([[*draw.coefficients.values()] for draw in drawn])

@@ -9,7 +9,6 @@ import emcee
 import numpy as np
 
 from identification.arrays import rounded
-from identification.judging.hard_turn import holds_turn
 from identification.judging.model_error import FEWEST_TRIALS, model_error
 from identification.judging.uncertainty import Uncertainty
 from identification.models.sailed import (
@@ -24,78 +23,6 @@ from identification.progress import counted
 from identification.samples.prediction import with_start
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats, Integers
-
-
-@dataclass(frozen=True, eq=False)
-class QuadraticMap:
-    """Map from nearly standard normal coordinates to the points of a posterior.
-
-    An axis bends by products of coordinates along axes that are less determined than
-    it. So its Jacobian is triangular, and its determinant constant: a density in these
-    coordinates is that of the points.
-    """
-
-    mode: Floats
-    axes: Floats  # columns, from the least determined to the most
-    #: coordinates of each product, both less than that of the axis that bends
-    first: Integers
-    second: Integers
-    bends: Floats  # shape (n_products, n_parameters)
-
-    def points(self, coordinates: Floats) -> Floats:
-        """Points of coordinates, both of shape (n_points, n_parameters)."""
-        products = coordinates[:, self.first] * coordinates[:, self.second]
-        bent = coordinates + products @ self.bends
-        return np.asarray(self.mode + bent @ self.axes.T)
-
-
-def quadratic_map(
-    mode: Floats,
-    jacobian: Floats,
-    errors: Callable[[Floats], Floats],
-) -> QuadraticMap:
-    """The map about a mode, with unit normal prior.
-
-    `jacobian` is that of the errors at the mode; `errors` gives them at points, shape
-    (n_rows, n_points), in units of which the squares are the data's part of the
-    density.
-    """
-    determined, directions = np.linalg.eigh(jacobian.T @ jacobian)
-    axes = directions / np.sqrt(np.maximum(determined, 0.0) + 1.0)
-    along = jacobian @ axes
-
-    def steps(coordinates: Floats) -> Floats:
-        """Gauss-Newton steps of each coordinate, shape (n_points, n_parameters)."""
-        return np.asarray(-errors(mode + coordinates @ axes.T).T @ along)
-
-    n_parameters = len(mode)
-    first, second = np.triu_indices(n_parameters)
-    bends = _second_differences(steps, first, second)
-    # an axis bends by those before it alone
-    later = second[:, None] >= np.arange(n_parameters)
-    bends[later] = 0.0
-    counts = np.abs(bends).max(axis=1) > 1e-3
-    return QuadraticMap(mode, axes, first[counts], second[counts], bends[counts])
-
-
-def _second_differences(
-    steps: Callable[[Floats], Floats], first: Integers, second: Integers
-) -> Floats:
-    """Coefficients of the products of coordinates in Gauss-Newton steps.
-
-    Central differences over a distance of 1; 0 where a ship is lost on the way.
-    """
-    n_parameters = int(second.max()) + 1
-    units = np.eye(n_parameters)
-    with np.errstate(invalid="ignore", over="ignore"):  # of ships that run away
-        middle = steps(np.zeros((1, n_parameters)))
-        single = steps(units) + steps(-units) - 2.0 * middle
-        corners = units[first] + units[second]
-        both = steps(corners) + steps(-corners) - 2.0 * middle
-        bends = 0.5 * (both - single[first] - single[second])
-    squared = first == second
-    bends[squared] = 0.5 * single
-    return np.nan_to_num(bends, posinf=0.0, neginf=0.0)
 
 
 class Mode(NamedTuple):
@@ -142,13 +69,6 @@ class CoarsenedPosterior:
         )
         of_data = fit.jac[: -len(start)]
         return Mode(fit.x, covariance_of(np.sqrt(self.power) * of_data))
-
-    def map(self, mode: Mode) -> QuadraticMap:
-        """Coordinates in which the density is nearly standard normal."""
-        data = self.trials.linearised(mode.point, self.scales)
-        return quadratic_map(
-            mode.point, np.sqrt(self.power) * data.jacobian, self.errors
-        )
 
     def model(self, mode: Mode) -> ShipModel:
         """The model of a mode, with its covariance."""
@@ -309,11 +229,6 @@ def with_posterior(
     chains = _chains(posterior, start, asked)
     mixing = mixing_of(chains)
     remarks = []
-    if not holds_turn(trials):
-        remarks.append(
-            "no trial turns through half a circle, and draws of a posterior are not"
-            " widened for that: do not rely on their hard turns"
-        )
     if not mixing.is_enough:
         remarks.append(
             f"posterior: the walkers did not mix in {mixing.steps} steps"
@@ -395,15 +310,19 @@ def coarsened(
 
 def _chains(posterior: CoarsenedPosterior, start: Floats, asked: Uncertainty) -> Floats:
     """Points that walkers went through, shape (n_steps, n_walkers, n_parameters)."""
-    shape = posterior.map(posterior.mode(start))
+    mode = posterior.mode(start)
+    axes = np.linalg.cholesky(mode.covariance)
+
+    def points(coordinates: Floats) -> Floats:
+        """Of nearly standard normal coordinates."""
+        return np.asarray(mode.point + coordinates @ axes.T)
 
     def log_density(coordinates: Floats) -> Floats:
-        return posterior.log_density(shape.points(coordinates))
+        return posterior.log_density(points(coordinates))
 
     rng = np.random.default_rng(0)
     walkers = _walkers(log_density, len(start), rng)
-    chains = sample(log_density, walkers, asked.steps)
-    return shape.points(chains.reshape(-1, len(start))).reshape(chains.shape)
+    return points(sample(log_density, walkers, asked.steps))
 
 
 def _with_draws(model: ShipModel, prior: CoefficientPrior, points: Floats) -> ShipModel:

@@ -24,7 +24,7 @@ class Uncertainty:
 
     covariance: str = "analytic"
     model_error: bool = True
-    steps: int = 100
+    steps: int = 130
 
     def __post_init__(self) -> None:
         kinds = ("analytic", "posterior")

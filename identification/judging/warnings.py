@@ -33,7 +33,7 @@ def error_source(provenance: Mapping[str, Any]) -> str:
         )
     source = "the residuals of the fit, correlated in time and between the equations"
     error = provenance.get("model_error")
-    if error:
+    if error and error["factor"] > 1.0:
         source += (
             f", and are multiplied by {error['factor']:.2g} because the equations are"
             f" not quite the ship's ({error['how']})"
@@ -60,7 +60,7 @@ def bias_sentences(bias: dict[str, Any] | None) -> list[str]:
     side = "starboard" if bias["angle_deg"] > 0.0 else "port"
     verdict = "which does not differ from zero"
     if bias["significant"]:
-        verdict = "the model has it" if bias["in_model"] else "by norrbin-bias"
+        verdict = "the model has it" if bias["in_model"] else "the model has none"
     return [
         f"Rudder bias: the ship runs straight with {abs(bias['angle_deg']):.2g} ±"
         f" {1.96 * bias['standard_error_deg']:.2g} deg (95 %) to {side}; {verdict}."
@@ -221,11 +221,6 @@ def _of_the_data(fit: Fit) -> Iterator[str]:
             f" {', '.join(sorted(derived))}; their noise is larger, and predictions can"
             " be much worse than with measured ones"
         )
-    if all(row["use"] != "validate" for row in fit.metrics["trials"].values()):
-        yield (
-            'no trial is marked use = "validate": nothing shows how well the model'
-            " predicts unseen manoeuvres"
-        )
     if estimated := sorted(fit.model.particulars.estimated):
         yield f"estimated, not given in the ship file: {', '.join(estimated)}"
 
@@ -253,7 +248,7 @@ def heading_errors_deg(fit: Fit, use: str | None = None) -> dict[str, float]:
 
 
 def held_out_error(fit: Fit) -> str:
-    """The worst error of the heading on the trials held out."""
+    """The worst error of the heading on the trials held out, or what to do."""
     for name, metrics in fit.metrics["trials"].items():
         if metrics["use"] == "validate" and metrics["diverged"]:
             return f"On {PurePath(name).name}, held out, the model runs away."
@@ -262,12 +257,33 @@ def held_out_error(fit: Fit) -> str:
         "validate",
     )
     if not errors:
-        return "No trial with a heading was held out."
+        return (
+            'No trial with a heading was held out: mark one use = "validate" to see how'
+            " well the model predicts manoeuvres that it was not fitted to."
+        )
     worst = max(errors, key=lambda name: errors[name])
     return (
         f"Worst error on held-out trials: heading {errors[worst]:.2g} deg rms"
         f" ({PurePath(worst).name})."
     )
+
+
+def without_indices(fit: Fit) -> list[str]:
+    """Of which trials no overshoot or diameter is read: a sentence a reason."""
+    reasons = {
+        None: 'trials without a kind (kind = "zigzag" or "turning-circle")',
+        "zigzag": "zigzags without heading, or with no turn to the other side",
+        "turning-circle": "turning circles without heading and position",
+    }
+    names = defaultdict[str, list[str]](list)
+    for trial in fit.trials:
+        found = [fit.metrics["trials"][trial.name].get(name) for name in INDICES]
+        if trial.kind in reasons and not any(found):
+            names[reasons[trial.kind]].append(PurePath(trial.name).name)
+    return [
+        f"No overshoot or diameter is read from {reason}: {', '.join(trials)}."
+        for reason, trials in names.items()
+    ]
 
 
 def inseparable(fit: Fit, left_out: bool = True) -> list[str]:

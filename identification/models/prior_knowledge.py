@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from shipgym import InputError, ShipModel
-from shipgym.checks import check_number
+from shipgym.checks import bounded, keep_numbers
 from shipgym.ships.hull_formulas import YOSHIMURA
 
 
@@ -22,7 +22,7 @@ class PriorKnowledge:
     """
 
     source: str | ShipModel = YOSHIMURA
-    strength: float | None = None
+    strength: float | None = bounded(None, above=0.0)
 
     def __post_init__(self) -> None:
         if not isinstance(self.source, str | ShipModel):
@@ -30,5 +30,4 @@ class PriorKnowledge:
                 "prior: expected a reference ship or the name of formulas, got"
                 f" {self.source!r}"
             )
-        if self.strength is not None:
-            check_number(self.strength, "prior.strength", above=0.0)
+        keep_numbers(self, "prior.")

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from shipgym.checks import check_number
+from shipgym.checks import bounded, keep_numbers
 
 WHOLE = 1e6  # ship lengths, more than any trial has
 
@@ -28,18 +28,11 @@ class Refinement:
     name: ClassVar[str] = "output-error"
     options: ClassVar[tuple[str, ...]] = ("segment_lengths", "pull")
 
-    segment_lengths: float = 3.4
-    pull: float = 1e-6
+    segment_lengths: float = bounded(3.4, at_least=0.1, at_most=WHOLE)
+    pull: float = bounded(1e-6, at_least=0.0)
 
     def __post_init__(self) -> None:
-        check_number(
-            self.segment_lengths,
-            "segment_lengths",
-            at_least=0.1,
-            at_most=WHOLE,
-            hint="in ship lengths",
-        )
-        check_number(self.pull, "pull", at_least=0.0)
+        keep_numbers(self)
 
 
 def whole_trials() -> Refinement:

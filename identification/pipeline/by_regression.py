@@ -14,7 +14,7 @@ from identification.estimators.covariance import (
 )
 from identification.estimators.linear import Estimators
 from identification.judging.diagnostics import diagnose
-from identification.judging.hard_turn import Without, beyond_trials
+from identification.judging.hard_turn import Without, beyond_trials, holds_turn
 from identification.judging.model_error import (
     FEWEST_TRIALS,
     model_error,
@@ -148,9 +148,14 @@ def certain(
         prior = prior or table_prior(model)
         model, report = with_posterior(model, used, prior, asked)
         provenance |= {"uncertainty": "posterior", "posterior": report}
-    elif without is not None and fit.stable and asked.model_error:
+    if without is not None and fit.stable and asked.model_error:
         model, beyond = beyond_trials(model, without, used)
         provenance["model_error"] |= beyond
+        if asked.by_sampling and not beyond and not holds_turn(used):
+            provenance["posterior"]["remarks"].append(
+                "no trial turns through half a circle, and draws of a posterior of so"
+                " many terms are not widened: do not rely on their hard turns"
+            )
         model = with_sound_draws(model, used)
     return evaluated(model, fit, problem, provenance, options)
 

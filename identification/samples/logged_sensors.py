@@ -23,17 +23,10 @@ def noise_and_waves(trials: Sequence[Trial], travel_time: float) -> dict[str, An
     logs = [trial.raw for trial in trials]
     noise = {}
     for name in ("psi", "r"):
-        levels = []
-        for log in logs:
-            is_there = name in log
-            is_measured = is_there and name not in log.derived
-            if is_measured:
-                values = log[name]
-                level = noise_level(log.t, values)
-                levels.append(level)
+        measured = [log for log in logs if name in log and name not in log.derived]
+        levels = [noise_level(log.t, log[name]) for log in measured]
         if levels:
-            median = np.median(levels)
-            noise[name] = float(median)
+            noise[name] = float(np.median(levels))
 
     found: dict[str, Any] = {"noise": noise}
     turning = [log for log in logs if "r" in log]
@@ -82,12 +75,7 @@ def _spectrum(log: Trial, frequency: Floats) -> tuple[Floats, float]:
     times = np.arange(t[0], t[-1], step)
     yaw_rate = np.interp(times, t, log["r"])
 
-    rate = 1.0 / step
-    piece = round(128.0 * rate)  # 128 s
-    piece = min(piece, len(times))
-    at, density = welch(yaw_rate, rate, nperseg=piece)
-
-    variance = SEA_TRIAL["yaw_rate"] ** 2
-    floor = 2.0 * variance * step
-    wanted = np.interp(frequency, at, density)
-    return wanted, floor
+    piece = min(round(128.0 / step), len(times))  # 128 s
+    at, density = welch(yaw_rate, 1.0 / step, nperseg=piece)
+    floor = 2.0 * SEA_TRIAL["yaw_rate"] ** 2 * step
+    return np.interp(frequency, at, density), floor

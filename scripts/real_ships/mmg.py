@@ -161,6 +161,7 @@ def run(data: Data) -> Section:
     models = {
         f"{REFERENCE}, nothing fitted": hsva.bare_reference(REFERENCE),
         "least squares, abkowitz": fitted(hsva, structure="abkowitz", method="ls"),
+        "auto": fitted(hsva, structure="auto"),
     }
     strengths = {name: chosen(found) for name, found in scores.items()}
     for name, settings in PRIORS.items():

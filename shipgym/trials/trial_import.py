@@ -32,8 +32,8 @@ _LACKING = {
         " HDT)"
     ),
     ("x", "u", "v", "stw", "ground_north", "X"): (
-        "no speed is known: the log has neither positions nor a speed; give the service"
-        " speed in the ship file"
+        "no speed is known: the log has neither positions nor a speed, and counts as"
+        " sailed at the service speed of the ship file"
     ),
 }
 _MAGNETIC = (

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 from certainty import PARTS, case
+from sensors import Sensors
 
 from identification import (
     RMSVM,
@@ -19,8 +21,10 @@ from identification import (
 from identification.judging.model_error import with_sound_draws
 from identification.judging.prediction import closed_loop
 from identification.judging.warnings import held_out_error
-from shipgym import ShipModel, Trial
+from identification.models.refinement import whole_trials
+from shipgym import Particulars, ShipModel, Trial
 from shipgym.manoeuvres import zigzag, zigzag_indices
+from tests.ships.nomoto import nomoto1_ship
 
 
 def made_up(n: int = 60) -> Samples:
@@ -75,6 +79,26 @@ def test_closed_loop_overshoots_do_not_depend_on_the_neutral_helm(
     assert found.overshoot_1_deg == pytest.approx(truth.overshoot_1_deg, abs=0.25)
     assert error < 0.4
     assert error < 0.5 * abs(open_loop.overshoot_2_deg - truth.overshoot_2_deg)
+
+
+@pytest.mark.parametrize("derived", [{"r"}, set()])
+def test_a_right_structure_is_not_called_wrong(derived: set[str]) -> None:
+    """K and T within a per cent: the noise alone explains what it mispredicts."""
+    ship = nomoto1_ship(0.07, 15.0, Particulars(length=100.0, speed=8.0))
+    sensors = Sensors(sampling_s=1.0)
+    trials = []
+    for seed, (angle, port) in enumerate(product([10.0, 20.0], [False, True])):
+        run = sensors.measure(zigzag(ship, angle, angle, port, 300.0, 0.5), seed)
+        channels = {name: run[name] for name in ("psi", "delta", "r")}
+        if derived:
+            channels["r"] = np.gradient(channels["psi"], run.t)
+        name = f"zigzag {seed}"
+        trials.append(Trial(run.t, channels, name=name, kind="zigzag", derived=derived))
+    asked = {"particulars": ship.particulars, "steering": ship.steering}
+    model = identify(trials, "nomoto", whole_trials(), **asked).model
+    truth = ship.coefficients
+    assert model.coefficients == pytest.approx(truth, rel=0.01)
+    assert (model.provenance or {})["model_error"]["factor"] == 1.0
 
 
 def test_the_worst_errors_on_trials_held_out_are_said(

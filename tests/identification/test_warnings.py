@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from identification.judging.warnings import (
+    held_out_error,
     model_warnings,
     why_unstable,
+    without_indices,
 )
 from shipgym import ShipModel, Trial
 
@@ -69,8 +71,7 @@ def test_each_cause_has_its_warning(mariner: ShipModel) -> None:
         fit(given(mariner, trials=[{"derived": ["v", "u"]}, {"derived": ["u"]}]))
     )
     assert derived.startswith("not measured but derived from other channels: u, v;")
-    (unseen,) = model_warnings(fit(ship, use="fit"))
-    assert unseen.startswith('no trial is marked use = "validate"')
+    assert 'mark one use = "validate"' in held_out_error(fit(ship, use="fit"))
     some = replace(ship.particulars, estimated=frozenset({"mass", "Y_vdot"}))
     assert model_warnings(fit(replace(ship, particulars=some))) == [
         "estimated, not given in the ship file: Y_vdot, mass"
@@ -94,3 +95,19 @@ def test_why_a_model_must_not_be_used(mariner: ShipModel) -> None:
     assert why_unstable(marked) == "its simulation runs away (rudder +35 deg)"
     bare = fit(replace(mariner, provenance=None), stable=False)
     assert why_unstable(bare) == "its simulation runs away (in a standard manoeuvre)"
+
+
+def test_trials_that_measure_no_index_are_told_by_their_reason(
+    mariner: ShipModel,
+) -> None:
+    kinds = {"a": None, "b": "zigzag", "c": "zigzag", "d": None, "e": "spiral"}
+    trials = [trial(name=f"runs/{name}", kind=kind) for name, kind in kinds.items()]
+    metrics: dict[str, Any] = {one.name: {"overshoot_1_deg": None} for one in trials}
+    metrics["runs/b"]["overshoot_1_deg"] = {"measured": 4.0}
+    told = without_indices(fit(mariner, trials=trials, metrics={"trials": metrics}))
+    unnamed, unturned = told
+    assert unnamed.startswith("No overshoot or diameter is read from trials without a")
+    assert unnamed.endswith(": a, d.")
+    assert unturned.endswith(
+        "zigzags without heading, or with no turn to the other side: c."
+    )
