@@ -141,22 +141,22 @@ def certain(
 
     `prior`: of a posterior; by default that of a table.
     """
-    asked, used = options.uncertainty, problem.used
+    asked = options.uncertainty
     if asked.by_sampling:
         from identification.judging.posterior import table_prior, with_posterior
 
         prior = prior or table_prior(model)
-        model, report = with_posterior(model, used, prior, asked)
+        model, report = with_posterior(model, problem.used, prior, asked)
         provenance |= {"uncertainty": "posterior", "posterior": report}
     if without is not None and fit.stable and asked.model_error:
-        model, beyond = beyond_trials(model, without, used)
+        model, beyond = beyond_trials(model, without, problem.used)
         provenance["model_error"] |= beyond
-        if asked.by_sampling and not beyond and not holds_turn(used):
+        if asked.by_sampling and not beyond and not holds_turn(problem.used):
             provenance["posterior"]["remarks"].append(
                 "no trial turns through half a circle, and draws of a posterior of so"
                 " many terms are not widened: do not rely on their hard turns"
             )
-        model = with_sound_draws(model, used)
+        model = with_sound_draws(model, problem.used)
     return evaluated(model, fit, problem, provenance, options)
 
 

@@ -84,7 +84,9 @@ def _at_service_speed(trial: Trial, particulars: Given) -> Trial:
     if "v" in trial:
         return trial
     missing = {"v": np.zeros(len(trial))}
-    speed = None if particulars is None else particulars.get("speed")
+    speed = None
+    if particulars is not None:
+        speed = particulars.get("speed")
     if "u" not in trial:
         if speed is None:
             return trial

@@ -12,6 +12,7 @@ from identification.samples.prediction import predict
 from real_ships.data import MeasuredShip
 from real_ships.section import headings, number
 from shipgym.models import ShipModel, converted_model
+from shipgym.ships import GreyBox
 from shipgym.trials.trial import Trial
 
 SHIP = "kvlcc2_marin"
@@ -41,7 +42,10 @@ def full_scale(model: ShipModel, marin: MeasuredShip) -> ShipModel:
         time_constant=model.steering.time_constant * travel / model.travel_time,
     )
     shaft = float(np.mean([trial["n"][0] for trial in marin.runs.values()]))
-    return converted_model(model, ship, gear, shaft)
+    box = model.dynamics
+    # of a bare reference at another scale the reference itself
+    own: Any = box.ship if isinstance(box, GreyBox) else model
+    return converted_model(own, ship, gear, shaft)
 
 
 def painter(
