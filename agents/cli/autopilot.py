@@ -18,6 +18,7 @@ from shipgym.manoeuvres.quantiles import DRAWS
 
 if TYPE_CHECKING:
     from agents.verification.result import AutopilotResult, Verification
+    from identification import IdentificationResult
 
 
 @with_identify_options
@@ -72,6 +73,19 @@ def autopilot_command(
     print_autopilot(result, out / "report.html", draws)
 
 
+def _simpler_structures(found: IdentificationResult) -> str:
+    """Hint at the next two structures of fewer coefficients, where `auto` chose."""
+    if "selection" not in found.metrics:
+        return ""
+    chosen, *others = found.metrics["selection"]["ranking"]
+    fewer = [
+        one["structure"]
+        for one in others
+        if one["stable"] and one["coefficients"] < chosen["coefficients"]
+    ]
+    return f", or give --structure {' or '.join(fewer[:2])}" if fewer else ""
+
+
 def print_autopilot(result: AutopilotResult, report: Path, draws: int) -> None:
     """Print the result; fail for an unstable model or if all designs are refused."""
     from agents.cli.terminal import answer, say, warn
@@ -86,7 +100,8 @@ def print_autopilot(result: AutopilotResult, report: Path, draws: int) -> None:
             FAILED,
         )
     if result.refusal is not None:
-        fail(f"no autopilot is given: {result.refusal}; see {report}", FAILED)
+        reason = result.refusal + _simpler_structures(result.identification)
+        fail(f"no autopilot is given: {reason}; see {report}", FAILED)
 
     for warning in model_warnings(result.identification):
         warn(warning)

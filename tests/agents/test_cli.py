@@ -350,7 +350,16 @@ def built(monkeypatch):
         stable=True,
         instability=None,
         refusal=None,
-        identification=None,
+        identification=SimpleNamespace(
+            metrics={
+                "selection": {
+                    "ranking": [
+                        {"structure": name, "coefficients": number, "stable": True}
+                        for name, number in (("abkowitz", 40), ("norrbin-bias", 4))
+                    ]
+                }
+            }
+        ),
         calls=[],
     )
 
@@ -374,7 +383,8 @@ def built(monkeypatch):
         ),
         (
             {"refusal": "every design loses control"},
-            "error: no autopilot is given: every design loses control; see",
+            "error: no autopilot is given: every design loses control, or give"
+            " --structure norrbin-bias; see",
         ),
         ({}, "warning: odd sway"),
     ],
