@@ -13,6 +13,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
+from types import GenericAlias
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -30,6 +31,12 @@ class Table(NamedTuple):
     array: Any  # the tile or vector in which it lies
     first: int  # entry of its first number
     step: int  # entries from one number to the next
+
+
+class Size(NamedTuple):
+    """Number of entries of an array, `Annotated[tuple[float, ...], Size(8)]`."""
+
+    entries: int
 
 
 class TableField:
@@ -80,7 +87,16 @@ def is_list(kind: Any) -> bool:
 def field_types(record: Record, notes: bool = False) -> dict[str, Any]:
     """Types of a record's fields by name; `notes`: with what `Annotated` adds."""
     names = vars(sys.modules[record.__module__])
-    return get_type_hints(record, globalns=names, include_extras=notes)
+    with_notes = get_type_hints(record, globalns=names, include_extras=True)
+    if notes:
+        return with_notes
+    types = get_type_hints(record, globalns=names)
+    for name, kind in types.items():
+        for note in getattr(with_notes[name], "__metadata__", ()):
+            if isinstance(note, Size):
+                entries = get_args(kind)[:1] * note.entries
+                types[name] = GenericAlias(tuple, entries)
+    return types
 
 
 def members(kind: Any) -> list[tuple[str, Any]]:

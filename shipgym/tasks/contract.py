@@ -4,7 +4,7 @@ A task file defines (`shipgym/tasks/course_keeping.py` is one)
 
 * `Settings`, `State`, `Reward` and `Observation`, named tuples of floats, of such
   records, and of arrays of a fixed size of either, which are tuples:
-  `tuple[Target, Target]`, or `tuple[(float,) * 8]`. `Settings`
+  `tuple[Target, Target]`, or `Annotated[tuple[float, ...], Size(8)]`. `Settings`
   has defaults, which are keywords of its environment; a last field annotated `Numbers`
   is a list. The fields of `Reward` are minus the parts of the cost of a step, such as
   minus the square of an error; `info` has them as `reward_NAME`, and the cost. What a
@@ -85,6 +85,7 @@ from shipgym.engine.lane_records import Interval, Random, Readings
 from shipgym.engine.mathematics import arctan2, clip, pick, sin_cos, wrap
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.random import GOLDEN, NORMAL, episode_word, normal, uniform
+from shipgym.engine.records import Size
 
 #: Observation between -1 and 1, of the same physical value.
 Unit = Annotated[float, ObservationSpec(-1.0, 1.0)]
@@ -126,6 +127,7 @@ __all__ = [
     "Scale",
     "Setting",
     "Ship",
+    "Size",
     "Unit",
     "arctan2",
     "at_service_speed",

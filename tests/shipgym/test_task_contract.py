@@ -12,7 +12,7 @@ TASK = """
 from typing import Annotated, NamedTuple
 
 from shipgym.tasks.contract import (
-    ObservationSpec, Setting, drawn, drawn_normal, under_way
+    ObservationSpec, Setting, Size, drawn, drawn_normal, under_way
 )
 
 REPORTED = ("luck", "gate")
@@ -42,7 +42,7 @@ class Settings(NamedTuple):
 
 class State(NamedTuple):
     targets: tuple[Target, Target]
-    headings: tuple[(float,) * 4]
+    headings: Annotated[tuple[float, ...], Size(4)]
     luck: float
     gate: float
     noise: float
@@ -179,8 +179,12 @@ def test_settings_are_checked(task, options, message):
 
 
 WRONG = {
-    "headings: tuple[(float,) * 4]": [
+    "headings: Annotated[tuple[float, ...], Size(4)]": [
         ("headings: tuple[float, ...]", "State.headings: expected a float, or"),
+        (
+            "headings: Annotated[tuple[float, ...], Size(0)]",
+            "State.headings: expected a float, or",
+        ),
         ("headings: tuple[float, str]", "State.headings: expected a float"),
     ],
     "    luck: float": [
