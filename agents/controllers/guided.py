@@ -9,6 +9,7 @@ the ship, rad.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from agents.controllers.controller import POSITIVE, Action, Bounds, Controller
 from agents.controllers.law import (
     Law,
+    Nothing,
     Number,
     PathSignals,
     Turns,
@@ -101,6 +103,8 @@ class Guided(Controller):
     has_autopilot = True
     settings_type = GuidanceSettings
     leads: ClassVar[type[Controller]] = Controller
+    #: Record of what its law reads of its gains and its design.
+    parameters_record: ClassVar[Any] = Nothing
     bounds: ClassVar[Mapping[str, Bounds]] = {
         **Controller.bounds,
         **dict.fromkeys(("lookahead", "task_lookahead"), POSITIVE),
@@ -110,6 +114,13 @@ class Guided(Controller):
 
     def __post_init__(self) -> None:
         self.check_leads(self.autopilot)
+
+    @cached_property
+    def parameters(self) -> Any:
+        """See `Controller.parameters`."""
+        known = {**self.design, **self.gains}
+        record = self.parameters_record
+        return record(*[known[name] for name in record._fields])
 
     @classmethod
     @takes_name
@@ -183,11 +194,6 @@ class Guided(Controller):
         following = tuple(shown[n : n + len(cls.may_observe)])
         has_more = following == cls.may_observe
         return cls.observes + cls.may_observe if has_more else cls.observes
-
-    @property
-    def path_radius(self) -> float:
-        """Radius of the path's arcs, m; of no effect on guidance that sees no turns."""
-        return self.gains.get("path_radius", 1.0)
 
     @classmethod
     def is_closed_form(cls) -> bool:
@@ -302,7 +308,8 @@ class Guided(Controller):
             roll_rate=known.get("roll_rate", zero),
             turns=turns,
         )
-        shown = shown_course(seen, self.gains["task_lookahead"], self.path_radius)
+        radius = self.gains.get("path_radius", 1.0)  # of no effect without turns
+        shown = shown_course(seen, self.gains["task_lookahead"], radius)
         return seen._replace(heading_error=wrapped(error - shown))
 
     def loop(self) -> Compensator:

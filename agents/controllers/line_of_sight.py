@@ -6,7 +6,6 @@ IEEE Conference on Decision and Control.
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -93,15 +92,6 @@ class IntegralLineOfSight(Guided):
     kind = "ilos"
     settings_type = LineOfSightSettings
     law = staticmethod(integral_line_of_sight)
+    parameters_record = LineOfSightGains
     memory_record = DriftMemory
     gain_names = (*Guided.gain_names, "integral")
-
-    @cached_property
-    def parameters(self) -> LineOfSightGains:
-        """Parameters of its law."""
-        gains = self.gains
-        return LineOfSightGains(
-            lookahead=gains["lookahead"],
-            integral=gains["integral"],
-            dt=self.design["dt"],
-        )

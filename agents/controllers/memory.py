@@ -40,8 +40,7 @@ def to_rows(record: Any, n_ships: int) -> Floats:
     """
     columns = [np.broadcast_to(one, n_ships) for one in _columns(record)]
     array = np.array(columns, dtype=np.float64)
-    rows: Floats = array.reshape(len(columns), n_ships).T
-    return rows
+    return array.reshape(len(columns), n_ships).T
 
 
 def next_rows(after: Any, before: Any, n_ships: int) -> Floats:

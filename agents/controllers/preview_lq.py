@@ -16,7 +16,6 @@ Hydrodynamics and Motion Control, 10.3 (line of sight), 2.4 (crab angle), 13.2
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -39,7 +38,6 @@ from agents.controllers.law import (
 from agents.controllers.lq import LQ
 from agents.controllers.seen_current import (
     CurrentMemory,
-    CurrentScales,
     seen_current,
 )
 from agents.controllers.wheel_over import own_lead
@@ -88,7 +86,7 @@ def preview_law(
     seen: PathSignals, memory: PreviewMemory, p: PreviewGains
 ) -> tuple[Number, PreviewMemory]:
     """Heading that keeps to the path and turns with it, against the path beside her."""
-    current = seen_current(seen, memory.current, current_scales(p))
+    current = seen_current(seen, memory.current, p)
     wanted = wanted_course(seen, current, p)
     course = wanted - p.crab_share * crab_angle(wanted, seen.surge, current, p)
     off = heading_error(seen, current, p)
@@ -106,18 +104,6 @@ def preview_law(
     asked = by_heading + by_yaw_rate + by_roll + p.sway_gain * seen.sway
     steered = clipped(asked, -most, most)
     return steered - seen.heading_error, PreviewMemory(current, off, yaw_rate)
-
-
-def current_scales(p: PreviewGains) -> CurrentScales:
-    """Parameters of the current that is seen."""
-    return CurrentScales(
-        update=p.current_update,
-        path_radius=p.path_radius,
-        sight=p.sight,
-        interval=p.interval,
-        slowest=0.2 * p.service_speed,
-        fastest=2.0 * p.service_speed,
-    )
 
 
 def wanted_course(seen: PathSignals, current: CurrentMemory, p: PreviewGains) -> Number:
@@ -364,6 +350,7 @@ class PreviewLQ(Guided):
     kind = "preview-lq"
     settings_type = PreviewSettings
     law = staticmethod(preview_law)
+    parameters_record = PreviewGains
     memory_record = PreviewMemory
     leads = LQ
     observes = (*Guided.observes, *COURSE_ERROR, *TURNS)
@@ -392,8 +379,3 @@ class PreviewLQ(Guided):
         """Signals that it reads, heel where it is observed."""
         heel = self.observation_names[len(self.observes) :]
         return (*self.reads, *heel)
-
-    @cached_property
-    def parameters(self) -> PreviewGains:
-        """Parameters of its law."""
-        return PreviewGains(*[self.gains[name] for name in PreviewGains._fields])

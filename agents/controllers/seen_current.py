@@ -9,7 +9,7 @@ Source: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 
 (speeds over ground and through the water, crab angle).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,21 +28,9 @@ class CurrentMemory(NamedTuple):
     started: Number  # 0 where an episode begins, else 1
 
 
-class CurrentScales(NamedTuple):
-    """Parameters of `seen_current`."""
-
-    update: Number  # share of a new current in its low-pass
-    path_radius: Number  # m
-    sight: Number  # m, beyond which turns are not seen
-    interval: Number  # s
-    slowest: Number  # m/s, speed along the path that is believed
-    fastest: Number  # m/s
-
-
-def seen_current(
-    seen: PathSignals, memory: CurrentMemory, p: CurrentScales
-) -> CurrentMemory:
-    """Current by another interval."""
+def seen_current(seen: PathSignals, memory: CurrentMemory, p: Any) -> CurrentMemory:
+    """Current by another interval; `p`: parameters of guidance that sees turns."""
+    fastest = 2.0 * p.service_speed
     turned, speed = passed_path(seen, memory, p)
     water_ahead, water_aside = rotated(seen.surge, seen.sway, seen.heading_error)
     carried_ahead, carried_aside = rotated(memory.ahead, memory.aside, turned)
@@ -50,16 +38,16 @@ def seen_current(
     over_ground = wrapped(seen.drift - seen.heading_error)  # against the path
     most_across = 1.2  # rad: beyond, the speed along the path says little
     is_along = np.abs(over_ground) < most_across
-    is_likely = (speed > p.slowest) & (speed < p.fastest)
+    is_likely = (speed > 0.2 * p.service_speed) & (speed < fastest)
     is_seen = is_along & is_likely
 
     ahead = np.where(is_seen, speed, water_ahead + carried_ahead)
     slope = np.tan(np.where(is_along, over_ground, 0.0))
     aside = np.where(is_along, ahead * slope - water_aside, carried_aside)
     is_first = is_seen & (memory.is_known == 0.0)
-    update = np.where(is_first | (memory.started == 0.0), 1.0, p.update)
-    seen_ahead = clipped(ahead - water_ahead, -p.fastest, p.fastest)
-    seen_aside = clipped(aside, -p.fastest, p.fastest)
+    update = np.where(is_first | (memory.started == 0.0), 1.0, p.current_update)
+    seen_ahead = clipped(ahead - water_ahead, -fastest, fastest)
+    seen_aside = clipped(aside, -fastest, fastest)
     return CurrentMemory(
         ahead=carried_ahead + update * (seen_ahead - carried_ahead),
         aside=carried_aside + update * (seen_aside - carried_aside),
@@ -72,7 +60,7 @@ def seen_current(
 
 
 def passed_path(
-    seen: PathSignals, memory: CurrentMemory, p: CurrentScales
+    seen: PathSignals, memory: CurrentMemory, p: Any
 ) -> tuple[Number, Number]:
     """What was passed of the path in an interval.
 
@@ -87,7 +75,7 @@ def passed_path(
     side = np.sign(memory.angle)
     of_arc = side * swept * (p.path_radius - side * seen.cross_track)
     of_leg = memory.distance - distance
-    farthest = p.fastest * p.interval
+    farthest = 2.0 * p.service_speed * p.interval
     noise = 1e-3  # rad, by which the angle of a turn ahead may seem to change
     is_last_leg = (angle == 0.0) & (memory.angle == 0.0)
     is_same_turn = has_started & (is_last_leg | (side * angle > 0.0))

@@ -10,7 +10,6 @@ Sources: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control,
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -104,6 +103,7 @@ class WheelOver(Guided):
     kind = "wheel-over"
     settings_type = WheelOverSettings
     law = staticmethod(wheel_over_law)
+    parameters_record = WheelOverGains
     observes = (*Guided.observes, *COURSE_ERROR, *TURNS)
     reads: ClassVar[tuple[str, ...]] = (
         "cross_track",
@@ -122,11 +122,6 @@ class WheelOver(Guided):
         **Guided.bounds,
         "path_radius": POSITIVE,
     }
-
-    @cached_property
-    def parameters(self) -> WheelOverGains:
-        """Parameters of its law."""
-        return WheelOverGains(*[self.gains[name] for name in WheelOverGains._fields])
 
 
 def own_lead(model: ShipModel, autopilot: Controller | None) -> float:

@@ -44,8 +44,7 @@ def imo_assessment(
     InputError for draws without covariance.
     """
     if n_draws is None:
-        identified = model.covariance is not None
-        n_draws = DRAWS if identified else 0
+        n_draws = 0 if model.covariance is None else DRAWS
     check_number(n_draws, "n_draws", at_least=0)
     draws: list[ShipModel] = []
     if n_draws > 0:
@@ -57,8 +56,8 @@ def assess_draws(model: ShipModel, draws: Iterable[ShipModel]) -> Assessment:
     """The criteria of a model and of models drawn."""
     needed = imo_manoeuvres(model)
     own = own_indices(model, needed)
-    evaluations = {name: test.evaluate for name, test in needed.items()}
-    return imo_criteria(model, intervals_of(own, draws, evaluations))
+    tests = {name: test.evaluate for name, test in needed.items()}
+    return imo_criteria(model, intervals_of(own, draws, tests))
 
 
 def imo_criteria(

@@ -105,14 +105,13 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
     quarter_turn = np.pi / 2
     diameter = speed_ratio = drift_deg = None
     if turned[-1] > half_turn + quarter_turn:
-        steady = _steady_turn(
+        diameter, speed_ratio, drift_deg = _steady_turn(
             trial,
             after,
             turned,
             side,
             lpp,
         )
-        diameter, speed_ratio, drift_deg = steady
     return TurningIndices(
         advance_lengths=reached(turned, quarter_turn, ahead),
         transfer_lengths=reached(turned, quarter_turn, aside),

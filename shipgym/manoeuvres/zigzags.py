@@ -178,7 +178,8 @@ def switch_heading_deg(trial: Trial) -> float | None:
     if not turns:
         return None
     turn = turns[0]
-    step = _sampling_step(trial, turn)
+    row = int(np.clip(np.searchsorted(trial.t, turn), 1, len(trial) - 1))
+    step = float(trial.t[row] - trial.t[row - 1])  # that ends at the turn or spans it
     around = _heading_change(trial, start, [turn - step, turn])
     changes_deg = np.degrees(np.abs(around))
     before, at = sorted(changes_deg.tolist())
@@ -205,12 +206,6 @@ def course_error_deg(trial: Trial) -> float:
     start, _ = reversals(trial)
     approach = trial["psi"][trial.t <= start]
     return float(np.degrees(np.std(approach)))
-
-
-def _sampling_step(trial: Trial, time: float) -> float:
-    """The sampling step that ends at or spans a time, s."""
-    row = int(np.clip(np.searchsorted(trial.t, time), 1, len(trial) - 1))
-    return float(trial.t[row] - trial.t[row - 1])
 
 
 def _heading_change(
