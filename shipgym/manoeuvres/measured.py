@@ -92,6 +92,9 @@ def measured_in_file(model: ShipModel) -> list[tuple[str, MeasuredIndex]]:
     found = list[tuple[str, MeasuredIndex]]()
     for trial, indices in check_table(table, where, trials).items():
         named = check_table(indices, f"{where} {trial}", RULES)
+        if len({RULES[name].manoeuvre for name in named}) > 1:
+            wanted = "indices of one manoeuvre, as a trial is"
+            raise unexpected(f"{where} {trial}", wanted, list(named))
         for name, given in named.items():
             place = f"{where} {trial} {name}"
             with placed(place, " "):

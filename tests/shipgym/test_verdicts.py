@@ -190,8 +190,10 @@ def test_what_trials_measured_travels_in_the_model_file():
     }
     ship = replace(load_model("kvlcc2"), provenance=provenance)
     assert measured_in_file(ship) == [("advance", MeasuredIndex(**index))]
+    both = {"advance": index, "overshoot_1_10_10": index}
     for name, wrong, message in (
         ("measured", {"other": {"advance": index}}, "measured: .*'other'"),
+        ("measured", {"turn": both}, "turn: expected indices of one manoeuvre"),
         ("measured", {"turn": {"advance": index | {"side": "aft"}}}, "advance side: "),
         ("measured", {"turn": {"advanse": index}}, "turn: .*Did you mean 'advance'"),
         ("trials", "turn", "trials: expected a list of tables, got 'turn'"),
