@@ -57,6 +57,10 @@ def at(values, row, value):
         ({"psi": SWING, "r": RATE / 5.3}, "changes 5.3 times as fast as the yaw rate"),
         ({"psi": TURN, "x": X, "y": Y, "u": U / 0.514, "v": V}, 'unit = "knots" }'),
         (
+            {"psi": SWING, "x": Y, "y": X, "sog": U, "cog": TURN},
+            "got north and east exchanged; exchange the columns of latitude",
+        ),
+        (
             {"psi": TURN, "x": X, "y": Y, "stw": U / 0.514},
             "0.514 times as much over ground, which no current does; likely a wrong"
             ' unit, declare stw = { column = "stw", unit = "knots" }',
@@ -283,3 +287,10 @@ def test_positions_in_a_wrong_unit_are_refused(factor, tmp_path):
         InputError, match=r"positions that change .* likely a wrong unit"
     ):
         ShipFile.load(folder / "ship.toml").trials()
+
+
+def test_rows_that_are_missing_are_told(tmp_path):
+    kept = (T < 100.0) | (T > 124.0)
+    columns = {"t": T[kept], "psi": SWING[kept], "delta": np.zeros(kept.sum())}
+    trial = Trial.from_csv(written(tmp_path / "log.csv", **columns))
+    assert "no rows for 26 s from 99 s on" in " ".join(trial.notes)

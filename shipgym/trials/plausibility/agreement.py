@@ -85,10 +85,22 @@ def _nearest_units(gain: float, locator: Locator) -> list[tuple[str, str]]:
 
 
 def check_steps(t: Floats, locator: Locator) -> list[str]:
-    """Remark on rows that are so far apart that the unit of time, s, may be wrong."""
+    """Remark on a hole, and on rows so far apart that the unit of time may be wrong.
+
+    `t` is in s.
+    """
     step = usual_step(t)
     if 0.005 <= step <= 10.0:
-        return []
+        steps = np.diff(t)
+        widest = int(np.argmax(steps))
+        hole = float(steps[widest])
+        if hole <= max(10.0 * step, 5.0):
+            return []
+        start = t[widest] - t[0]
+        return [
+            f"no rows for {hole:.3g} s from {start:.4g} s on; leave a manoeuvre that is"
+            " interrupted out with cut"
+        ]
     unit = "ms" if step > 10.0 else "min"
     return [
         f"the rows are {step:.4g} s apart, which is unusual in a manoeuvre; if the unit"
@@ -162,6 +174,8 @@ def check_over_ground(log: Log, conventions: Conventions, locator: Locator) -> N
     The channels are as logged, in SI units, the heading without jumps.
     """
     north, east = log.ground_velocity
+    if log.has("x", "y", "ground_north"):
+        _check_exchanged(log, north + 1j * east, locator)
     speed = np.hypot(north, east)
     fastest = np.quantile(speed, 0.95)
     if fastest < _SLOWEST:
@@ -187,6 +201,25 @@ def check_over_ground(log: Log, conventions: Conventions, locator: Locator) -> N
     fault = _heading_fault(psi, course, offset_is_known=is_known)
     if fault:
         raise InputError(f"{locator.path}: expected a heading {fault}")
+
+
+def _check_exchanged(
+    log: Log, velocity: npt.NDArray[np.complex128], locator: Locator
+) -> None:
+    """Refuse positions of which only the exchanged ones follow the velocity."""
+    position = log.channels["x"] + 1j * log.channels["y"]
+    sailed = integral(log.t, velocity)
+    _, moved, expected = changes(log.t, 10.0, position, sailed)
+    exchanged = 1j * np.conj(moved)
+    distance = np.linalg.norm(expected)
+    is_off = np.linalg.norm(moved - expected) > 0.7 * distance
+    # longitudes taken for latitudes are up to twice as long
+    if is_off and np.linalg.norm(exchanged - expected) < 0.5 * distance:
+        raise InputError(
+            f"{locator.path}: expected positions that follow the course over ground,"
+            " got north and east exchanged; exchange the columns of latitude and"
+            " longitude, or of x and y"
+        )
 
 
 def check_speed_units(log: Log, locator: Locator) -> None:
