@@ -17,6 +17,7 @@ from shipgym.manoeuvres.intervals import IndexInterval, worst
 from shipgym.manoeuvres.measured import MeasuredIndex
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.stopping import StoppingIndices
+from shipgym.manoeuvres.turning import TurningIndices
 from shipgym.models.ship_model import ShipModel
 from shipgym.ships.envelope import ENVELOPE_CHANNELS
 
@@ -317,7 +318,7 @@ def _why_undecided(criterion: Criterion) -> str:
     unmeasured = [side for side in criterion.sides if side.measured is None]
     why = "the models drawn lie on both sides of the limit"
     if any(side.outside for side in unmeasured):
-        why = "it is outside the envelope of the trials"
+        why = "it is outside the envelope of the trials or of the structure"
     if not unmeasured:
         return (
             f"{criterion.measured:.2f} was measured with a standard error of"
@@ -331,10 +332,14 @@ def _why_undecided(criterion: Criterion) -> str:
 def outside_envelope(model: ShipModel, test: Manoeuvre) -> bool:
     """Return whether a manoeuvre leaves the envelope of the trials.
 
-    By more than 0.15 of its size, in a turn up to 180 degrees.
+    By more than 0.15 of its size, in a turn up to 180 degrees. A structure without
+    speed says nothing about a turn's size.
     """
     if model.envelope is None or test.outcome is StoppingIndices:
         return False
+    has_speed = "u" in getattr(model.dynamics, "equations", "u")
+    if test.outcome is TurningIndices and not has_speed:
+        return True
     try:
         run = test.sail(model)
     except (UnstableModelError, ManoeuvreError):

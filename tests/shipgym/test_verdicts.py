@@ -46,13 +46,23 @@ def test_a_turn_outside_the_envelope_of_the_trials_is_not_decided(of_zigzags):
             None,
             None,
         )
-        assert criterion.note.endswith("outside the envelope of the trials")
+        assert criterion.note.endswith(
+            "outside the envelope of the trials or of the structure"
+        )
         assert len(criterion.deciding_trials) == 2
         assert criterion.interval[0] <= criterion.value <= criterion.interval[1]
     assert "35 deg turn to both sides" in trials_to_run(of_zigzags)
     told = of_zigzags["advance"].to_dict()
     assert told["decided"] is False
     assert told["probability"] is told["measured"] is None
+
+
+def test_a_structure_without_speed_decides_no_turn():
+    model = load_model("mariner-nomoto")
+    found = imo_assessment(model, n_draws=20)
+    for name in ("advance", "tactical_diameter"):
+        assert not found[name].decided
+    assert found["overshoot_1_10_10"].decided
 
 
 def test_within_the_trials_the_interval_decides(of_zigzags):
