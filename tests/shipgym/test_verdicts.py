@@ -46,9 +46,7 @@ def test_a_turn_outside_the_envelope_of_the_trials_is_not_decided(of_zigzags):
             None,
             None,
         )
-        assert criterion.note.endswith(
-            "outside the envelope of the trials or of the structure"
-        )
+        assert "it is outside the envelope of the trials" in criterion.note
         assert len(criterion.deciding_trials) == 2
         assert criterion.interval[0] <= criterion.value <= criterion.interval[1]
     assert "35 deg turn to both sides" in trials_to_run(of_zigzags)
@@ -62,7 +60,7 @@ def test_a_structure_without_speed_decides_no_turn():
     found = imo_assessment(model, n_draws=20)
     for name in ("advance", "tactical_diameter"):
         assert not found[name].decided
-    assert found["overshoot_1_10_10"].decided
+        assert "or of the structure" in found[name].note
 
 
 def test_within_the_trials_the_interval_decides(of_zigzags):
