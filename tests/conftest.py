@@ -6,6 +6,9 @@ import tempfile
 import pytest
 
 from shipgym.engine.cache import CACHE_VARIABLE, cache_folder
+from shipgym.engine.numba_import import load_numba
+
+load_numba()  # test modules that import Numba themselves must not be the first
 
 try:
     cache_folder().mkdir(parents=True, exist_ok=True)
