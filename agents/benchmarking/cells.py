@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from agents.benchmarking.entries import Entry, file_hash
+from agents.benchmarking.entries import Entry, file_hash, names_code
 from agents.rollouts.metrics import evaluate
 from agents.suites.benchmark_task import BenchmarkTask, judging_seeds
 from shipgym.arrays import Floats
@@ -67,20 +67,20 @@ class Cell:
         for on, figures in self.figures.items():
             n_runs, n_episodes = figures["cost"].shape
             seeds = judging_seeds(on, options.episodes, options.seed)
-            runs = np.arange(n_runs)
-            run_of_each = np.repeat(runs, n_episodes)
             columns: dict[str, Any] = {
                 "controller": controller,
                 "task": task,
                 "set": on,
-                "run": run_of_each,
+                "run": np.repeat(np.arange(n_runs), n_episodes),
                 "seed": np.tile(seeds, n_runs),
             }
             for name, values in figures.items():
                 columns[name] = values.ravel()
-            table = pd.DataFrame(columns)
-            tables.append(table)
-        return pd.concat(tables, ignore_index=True)
+            tables.append(pd.DataFrame(columns))
+        return pd.concat(
+            tables,
+            ignore_index=True,
+        )
 
 
 #: Every cell by the names of its entry and its task.
@@ -94,7 +94,7 @@ def run_cell(entry: Entry, task: BenchmarkTask, options: Options) -> Cell:
     except InputError as error:
         return Cell(refused=str(error))
     except Exception as error:
-        if entry.is_text and not entry.is_code:
+        if entry.is_text and not names_code(entry.source):
             raise
         # a user's own function may raise anything
         return Cell(refused=told(error))

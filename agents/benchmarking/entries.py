@@ -97,11 +97,6 @@ class Entry:
         """Return whether another process can make it too."""
         return isinstance(self.source, str)
 
-    @property
-    def is_code(self) -> bool:
-        """Return whether it is `module:function`, whose code is run."""
-        return self.is_text and names_code(self.source)
-
     def made(self, task: BenchmarkTask, runs: int = 1, budget: float = inf) -> Made:
         """Make its controllers for a task, at most so many runs.
 
@@ -281,12 +276,10 @@ def _runs(source: Any, task: BenchmarkTask, runs: int) -> list[Policy]:
     """Make the runs of a policy, a function or a class of controllers."""
     is_policy = hasattr(source, "predict")
     if is_policy or "seed" not in inspect.signature(source).parameters:
-        policy = _policy(source, task)
-        return [policy]
+        return [_policy(source, task)]
     policies = []
     for seed in range(runs):
-        seeded = partial(source, seed=seed)
-        policies.append(_policy(seeded, task))
+        policies.append(_policy(partial(source, seed=seed), task))
     return policies
 
 
@@ -330,8 +323,7 @@ def _module(text: str) -> ModuleType:
     """Import the module or file that a function is named in."""
     module, _, _ = text.rpartition(":")
     if module.endswith(".py"):
-        path = Path(module)
-        return load_file(path)
+        return load_file(Path(module))
     return import_named(module, text, "controllers")
 
 
@@ -345,8 +337,7 @@ def source_files(text: str, task: BenchmarkTask) -> list[Path]:
     if text in known_names():
         path = kept.get(text)
         return [path] if path and path.is_file() else []
-    pattern = text.replace("{task}", task.name)
-    return _matching_files(pattern)
+    return _matching_files(text.replace("{task}", task.name))
 
 
 def _matching_files(pattern: str) -> list[Path]:

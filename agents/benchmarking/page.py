@@ -1,6 +1,6 @@
 """The page of a benchmark: one HTML file with tables and the method."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -76,13 +76,9 @@ def write_page(result: BenchmarkResult, path: str | Path) -> None:
 
 def sweep_figure(result: BenchmarkResult) -> Any:
     """Mean cost of each controller on the ship and along the sweep of each task."""
-    shown = []
-    for task in result.tasks:
-        panel = _sweep_panel(result, task)
-        shown.append(panel)
+    shown = [_sweep_panel(result, task) for task in result.tasks]
     rows = ceil(len(shown) / 2)
-    height = 100 + 230 * rows
-    return panels(shown, height, 2)
+    return panels(shown, 100 + 230 * rows, 2)
 
 
 def _sweep_panel(result: BenchmarkResult, task: str) -> Panel:
@@ -99,34 +95,19 @@ def _sweep_panel(result: BenchmarkResult, task: str) -> Panel:
     for name in result.cells(task):
         cells = [result.cells(task, on)[name] for on in sets]
         costs = [cell["cost"]["value"] for cell in cells]
-        curve = line(points, costs, name, **styles[name])
-        curves.append(curve)
-    changed = _sweep_text(about["sweep"])
+        curves.append(line(points, costs, name, **styles[name]))
+    changed = "no sweep"
+    if about["sweep"]:
+        changed = f"0: as ranked; then {', '.join(about['sweep'][-1])}"
     x = axis(changed, tickvals=points)
     y = axis("mean cost", type="log")
     return Panel(curves, x, y, task)
-
-
-def _sweep_text(sweep: Sequence[Mapping[str, Any]]) -> str:
-    """What changes along a sweep."""
-    if not sweep:
-        return "no sweep"
-    *_, last = sweep
-    names = ", ".join(last)
-    return f"0: as ranked; then {names}"
 
 
 def _limits_text(limits: Mapping[str, float]) -> str:
     """Sentence on the limits of a task; empty if it has none."""
     parts = []
     for name, limit in limits.items():
-        title = METRICS[name]
-        kind = LIMITED_FIGURES[name]
-        statistic = STATISTICS[kind]
-        largest = number(limit)
-        part = f"{title} {largest} ({statistic})"
-        parts.append(part)
-    if not parts:
-        return ""
-    limited = "; ".join(parts)
-    return f"Limits: {limited}."
+        statistic = STATISTICS[LIMITED_FIGURES[name]]
+        parts.append(f"{METRICS[name]} {number(limit)} ({statistic})")
+    return f"Limits: {'; '.join(parts)}." if parts else ""

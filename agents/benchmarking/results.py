@@ -195,12 +195,6 @@ def collect(
     names = [entry.name for entry in entries]
     computed = Summary(suite, tasks, names, cells, rules, options)
     by_task = computed.by_task()
-    about_tasks = {}
-    for task in tasks:
-        about_tasks[task.name] = {
-            **task.to_dict(),
-            "model_sha256": model_hash(task.ship),
-        }
     source = Path(suite.source)
     summary = {
         "format": FORMAT,
@@ -211,7 +205,10 @@ def collect(
             "sha256": suite.sha256,
             "file": source.name if source.suffix == ".toml" else "",
             "n_tasks": len(suite.tasks),
-            "tasks": about_tasks,
+            "tasks": {
+                task.name: {**task.to_dict(), "model_sha256": model_hash(task.ship)}
+                for task in tasks
+            },
         },
         "options": options._asdict(),
         "controllers": {

@@ -85,8 +85,7 @@ class Summary:
                 cell = self.cells[name, task.name]
                 if not cell.refused:
                     means = metrics[task.name, on, name]
-                    figures = self._of_cell(task, on, name, means)
-                    sets[on][name] = figures
+                    sets[on][name] = self._of_cell(task, on, name, means)
         return found
 
     def _of_cell(
@@ -95,16 +94,12 @@ class Summary:
         cell = self.cells[name, task.name]
         figures = cell.figures[on]
         costs = figures["cost"]
-        own = {task.name: costs}
-        rules = self.costs("", on)
-        lost = figures["terminated"].sum()
-        failed = figures["failed"].sum()
         return {
             "cost": mean_cost(costs, task.name),
-            "score": mean_score(own, rules),
+            "score": mean_score({task.name: costs}, self.costs("", on)),
             "runs": len(costs),
-            "lost": int(lost),
-            "failed": int(failed),
+            "lost": int(figures["terminated"].sum()),
+            "failed": int(figures["failed"].sum()),
             "failure": cell.failures.get(on, ""),
             "exceeded": exceeded(task.limits, means),
             "metrics": means,
@@ -120,10 +115,7 @@ class Summary:
         rankings: dict[str, list[dict[str, Any]]] = {}
         for task in self.tasks:
             if task.part not in rankings:
-                totals = []
-                for name in self.names:
-                    total = self._total(name, task.part, by_task)
-                    totals.append(total)
+                totals = [self._total(name, task.part, by_task) for name in self.names]
                 rankings[task.part] = sorted(totals, key=_sort_key)
         return rankings
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
@@ -10,7 +10,7 @@ from agents.cli.tables import between, number, plain_table
 from shipgym.pages.numbers import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
     from rich.table import Table
 
@@ -41,9 +41,14 @@ def ranking_tables(result: BenchmarkResult) -> Iterator[Table]:
         )
         for one in totals:
             failed = one["failed"]
+            cells = [""] * len(scores)
+            score = one["scores"].get("ship")
+            if score is not None:
+                ends = score["low"], score["high"]
+                cells = [number(score["value"], 3), between(ends, 3)]
             table.add_row(
                 one["name"],
-                *_interval(one["scores"].get("ship"), 3)[: len(scores)],
+                *cells,
                 number(one["mean_cost"], 2),
                 f"{one['tasks']} of {one['of']}",
                 str(one["lost"]),
@@ -51,10 +56,3 @@ def ranking_tables(result: BenchmarkResult) -> Iterator[Table]:
                 ", ".join(one["exceeding"]),
             )
         yield table
-
-
-def _interval(of: Mapping[str, Any] | None, decimals: int) -> tuple[str, str]:
-    """Return a value and its interval."""
-    if of is None:
-        return "", ""
-    return number(of["value"], decimals), between((of["low"], of["high"]), decimals)

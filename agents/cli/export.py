@@ -58,20 +58,22 @@ def export_command(
         )
     graph = onnx_model(load_agent(what)) if onnx is not None else None
     source = _source(what, name, depth) if has_source else None
+    files = {}
+    if source is not None:
+        files = {f"{source.name}.h": source.header, f"{source.name}.c": source.source}
     # all are checked before the first is written
     if fmu is not None:
         check_fmu_name(fmu)
     for file in (fmu, onnx):
         if file is not None:
             check_file(file)
-    if c is not None and source is not None:
-        check_folder(c, (f"{source.name}.h", f"{source.name}.c"))
+    if c is not None:
+        check_folder(c, files)
     if source is not None and fmu is not None:
         write_fmu(source, fmu)
     if graph is not None and onnx is not None:
         write_bytes(graph.SerializeToString(), onnx)
-    if source is not None and c is not None:
-        files = {f"{source.name}.h": source.header, f"{source.name}.c": source.source}
+    if c is not None:
         with whole_folder(c, files) as draft:
             for file_name, text in files.items():
                 (draft / file_name).write_text(text, encoding="utf-8")

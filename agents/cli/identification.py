@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Option
 
-from agents.cli.command import FAILED, ShipFileArgument, fail
+from agents.cli.command import FAILED, Out, ShipFileArgument, fail
 from agents.cli.identify_options import with_identify_options
 
 if TYPE_CHECKING:
     from identification import IdentificationResult
     from shipgym.trials.ship_file import ShipFile
 
-Out = Annotated[Path, Option(metavar="FOLDER", help="Folder for the results.")]
 Report = Annotated[
     bool, Option("--report", help="Write report.html too, a page with the figures.")
 ]

@@ -28,23 +28,16 @@ def identify_options(
         str | None,
         Option(help="How coefficients are fitted; default: the file's, else tls-svm."),
     ] = None,
-    reference_model: Annotated[
-        str | None,
-        Option(help="Reference ship of a grey box: auto, a name or a file."),
-    ] = None,
     set_: Settings = None,
 ) -> dict[str, Any]:
     """Options given on the command line, by name; a flag goes before `--set`."""
     from shipgym.files import named_values
 
     found = named_values(set_ or (), "--set", "seed=3")
-    by_flag = {
-        "structure": structure,
-        "method": method,
-        "reference_model": reference_model,
-    }
-    given = {name: value for name, value in by_flag.items() if value is not None}
-    return found | given
+    for name, value in {"structure": structure, "method": method}.items():
+        if value is not None:
+            found[name] = value
+    return found
 
 
 #: Gives a command these options, as its argument `options`.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -64,18 +65,13 @@ def new_ship_command(
     ship_file = render("shipgym.pages/ship.toml.jinja", **facts)
     write_text(ship_file, out)
 
-    notes = _notes(guessed)
+    read = [one.trial.notes for one in guessed if one.trial is not None]
+    notes = list(dict.fromkeys(chain.from_iterable(read)))
     answer({"written": str(out), **_fields(guessed[0], facts), "notes": notes})
     summary = render("shipgym.pages/new_ship.txt.jinja", **facts)
     say(summary.strip())
     for note in notes:
         warn(note)
-
-
-def _notes(guessed: list[TrialGuess]) -> list[str]:
-    """Notes of all logs that were read, each once."""
-    read = [one.trial for one in guessed if one.trial is not None]
-    return list(dict.fromkeys(note for trial in read for note in trial.notes))
 
 
 def _check_again(path: Path) -> None:
@@ -97,7 +93,10 @@ def _fields(first: TrialGuess, facts: dict[str, Any]) -> dict[str, Any]:
     side = facts["side"]
     columns = {}
     for one in first.columns:
-        columns[one.channel] = {"column": one.name, "unit": one.unit}
+        columns[one.channel] = {
+            "column": one.name,
+            "unit": one.unit,
+        }
     return {
         "columns": columns,
         "unused": first.unused,
@@ -177,10 +176,13 @@ def _to_decide(
 def _entry(
     guess: TrialGuess, shared: list[ColumnGuess], folder: Path
 ) -> dict[str, Any]:
-    """A log for the template of the ship file."""
+    """A log for the template of the ship file, its path as a text of TOML."""
     of_trial = (one.choices for one in guess.decisions if one.section == "trials")
     return {
-        "file": _toml_path(guess.table.path, folder),
+        "file": json.dumps(
+            os.path.relpath(guess.table.path, folder),
+            ensure_ascii=False,
+        ),
         "columns": [] if shared else guess.columns,
         "cut": _cut(guess),
         "decision": next(of_trial, None),
@@ -229,11 +231,6 @@ def _service_speed(guessed: list[TrialGuess]) -> float | None:
     trials = [one.trial for one in guessed if one.trial is not None]
     speeds = [float(np.quantile(one["u"], 0.9)) for one in trials if "u" in one]
     return max(speeds, default=None)
-
-
-def _toml_path(path: Path, folder: Path) -> str:
-    """A path relative to a folder, as a text of TOML."""
-    return json.dumps(os.path.relpath(path, folder), ensure_ascii=False)
 
 
 def look_command(

@@ -84,7 +84,11 @@ class Structures:
             return Rows(len(value))
         if isinstance(value, tuple):
             kinds = tuple([self.kind_of(part) for part in value])
-            return Struct(type(value), self._labels_of(value), kinds)
+            return Struct(
+                type(value),
+                self._labels_of(value),
+                kinds,
+            )
         if isinstance(value, bool | np.bool_):
             return bool
         if isinstance(value, int | float | np.number):

@@ -141,7 +141,8 @@ def _started(model: ShipModel, names: set[str], variables: Variables) -> Variabl
     started = {}
     for name, variable in variables.items():
         if name in names:
-            started[name] = variable._replace(start=start.get(name, 0.0))
+            begin = start.get(name, 0.0)
+            started[name] = variable._replace(start=begin)
     return started
 
 

@@ -170,7 +170,11 @@ class FunctionWriter:
             names = list(inspect.signature(self.function).parameters)
             arguments = []
             for argument, kind in zip(names, self.kinds, strict=True):
-                arguments.append(self._argument(argument, kind))
+                if isinstance(kind, FunctionType):
+                    arguments.append(Callee(kind, self))
+                else:
+                    node = self.node(free(argument, TAKEN), (), kind)
+                    arguments.append(self.unfolded(node))
             run = partial(self._copy(), *arguments)
             result = self.folded(self._by_ways(run, ()))
             returns = self.c.structures.kind_of(result)
@@ -179,11 +183,6 @@ class FunctionWriter:
         except Exception as error:
             raise self._refusal(error) from error
         return self._text(name, result), returns
-
-    def _argument(self, name: str, kind: Any) -> Any:
-        if isinstance(kind, FunctionType):
-            return Callee(kind, self)
-        return self.unfolded(self.node(free(name, TAKEN), (), kind))
 
     def _copy(self) -> Callable[..., Any]:
         """The function, with names for what it calls that write C."""

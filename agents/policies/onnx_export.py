@@ -36,7 +36,11 @@ def onnx_model(policy: Any) -> Any:
     for name, value in constants.items():
         tensor = onnx.numpy_helper.from_array(np.asarray(value), name)
         model.graph.initializer.append(tensor)
-    onnx.helper.set_model_props(model, _metadata(policy))
+    fields, _ = policy.file_fields()
+    for name in ("format", "kind", "network", "training"):
+        del fields[name]  # says nothing to someone who runs the graph
+    metadata = {name: json.dumps(value) for name, value in fields.items()}
+    onnx.helper.set_model_props(model, metadata)
     onnx.checker.check_model(model, full_check=True)
     return model
 
@@ -68,20 +72,14 @@ def _network(network: Network, x: str) -> tuple[list[str], str, dict[str, Any]]:
     constants: dict[str, Any] = {}
     last = len(network.layers) - 1
     for i, layer in enumerate(network.layers):
-        weight = f"weight_{i}"
-        bias = f"bias_{i}"
-        constants[weight] = layer.weight
-        constants[bias] = layer.bias
-        line = f"sum_{i} = Gemm <transB = 1> ({x}, {weight}, {bias})"
-        lines.append(line)
+        constants[f"weight_{i}"] = layer.weight
+        constants[f"bias_{i}"] = layer.bias
+        lines.append(f"sum_{i} = Gemm <transB = 1> ({x}, weight_{i}, bias_{i})")
         x = f"sum_{i}"
 
-        is_last = i == last
-        between = network.output if is_last else network.activation
+        between = network.output if i == last else network.activation
         if between in OPERATORS:
-            operator = OPERATORS[between]
-            line = f"layer_{i} = {operator} ({x})"
-            lines.append(line)
+            lines.append(f"layer_{i} = {OPERATORS[between]} ({x})")
             x = f"layer_{i}"
     return lines, x, constants
 
@@ -91,8 +89,7 @@ def _action(policy: LearnedPolicy, output: str) -> tuple[list[str], dict[str, An
     if policy.action == "rudder-discrete":
         number = f"number = ArgMax <axis = 1, keepdims = 1> ({output})"
         action = "action = Gather <axis = 0> (orders, number)"
-        orders = {"orders": ORDERS}
-        return [number, action], orders
+        return [number, action], {"orders": ORDERS}
     limits = {"low": np.float32(-1.0), "high": np.float32(1.0)}
     if policy.base is None:
         return [f"action = Clip ({output}, low, high)"], limits
@@ -103,15 +100,3 @@ def _action(policy: LearnedPolicy, output: str) -> tuple[list[str], dict[str, An
         "action = Clip (wanted, low, high)",
     ]
     return lines, {**limits, "authority": np.float32(policy.authority)}
-
-
-def _metadata(policy: LearnedPolicy) -> dict[str, str]:
-    """Fields of the policy's file, each as JSON."""
-    content, _ = policy.file_fields()
-    # Fields of a policy's file that say nothing to someone who runs the graph.
-    left_out = ("format", "kind", "network", "training")
-    return {
-        name: json.dumps(value)
-        for name, value in content.items()
-        if name not in left_out
-    }

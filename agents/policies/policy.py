@@ -322,7 +322,10 @@ class LearnedPolicy(Fitting):
                 "sizes": network.sizes,
             },
             "base": None if self.base is None else self.base.to_dict(),
-            "environment": {"id": self.env_id, "options": self.env_options},
+            "environment": {
+                "id": self.env_id,
+                "options": self.env_options,
+            },
             "model": {"name": self.model_name, "sha256": self.model_sha256},
             "training": self.training,
         }

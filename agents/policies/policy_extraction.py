@@ -139,7 +139,10 @@ def _environment(ships: Any) -> dict[str, Any]:
             f" {type(ships).__name__}"
         )
     names = tuple(ships.observation_names)
-    name_of_env, options = env_id(task_showing(names)), {}
+    task = "PathFollowing" if "cross_track" in names else "CourseKeeping"
+    if "others_0_dcpa" in names:
+        task = "Encounter"
+    name_of_env, options = env_id(task), {}
     if ships.spec is not None:
         name_of_env = ships.spec.id
         options = _options(ships.spec.kwargs)
@@ -173,13 +176,6 @@ def _options(keywords: Mapping[str, Any]) -> dict[str, Any]:
             continue
         options[name] = as_json(value)
     return options
-
-
-def task_showing(names: Sequence[str]) -> str:
-    """Task of the package that shows these quantities."""
-    if "others_0_dcpa" in names:
-        return "Encounter"
-    return "PathFollowing" if "cross_track" in names else "CourseKeeping"
 
 
 def _network(agent: Any) -> Network:

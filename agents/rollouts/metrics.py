@@ -49,7 +49,10 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         reached, else whether control was kept.
     """
     nowhere = np.full(len(run.costs), np.nan)
-    followed = dict.fromkeys(("cross_track_rmse_m", "outside_corridor"), nowhere)
+    followed = dict.fromkeys(
+        ("cross_track_rmse_m", "outside_corridor"),
+        nowhere,
+    )
     if {"cross_track", "in_corridor"} <= run.histories.keys():
         followed = path_following(run)
     success = succeeded(run)

@@ -139,13 +139,9 @@ def _histories(runs: Mapping[str, Episode], trials: Mapping[str, Trial]) -> Figu
         *others,
         Panel(rewards, "time, s", "reward so far"),
     ]
-    drawn = [panel for panel in shown if _moves(panel.traces)]
+    # without what is 0 throughout
+    drawn = [one for one in shown if any(np.any(line["y"]) for line in one.traces)]
     return panels(drawn, 190 * ((len(drawn) + 1) // 2) + 80, 2)
-
-
-def _moves(traces: Sequence[Mapping[str, Any]]) -> bool:
-    """Tell whether any line is not 0 throughout."""
-    return any(np.any(trace["y"]) for trace in traces)
 
 
 def _outcome(episode: Episode) -> str:

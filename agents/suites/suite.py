@@ -81,8 +81,7 @@ class Suite:
         if names is None:
             return self.tasks
         if isinstance(names, str):
-            parts = names.split(",")
-            names = [name.strip() for name in parts]
+            names = [name.strip() for name in names.split(",")]
         if not names:
             raise InputError("tasks: expected at least one, got none")
         return tuple(self.task(name) for name in dict.fromkeys(names))
@@ -110,8 +109,7 @@ def load_suite(suite: str | Path = DEFAULT_SUITE, allow_code: bool = False) -> S
     text = read_text(path, "TOML file of a suite", LARGEST_TOML)
     found = parse_suite(text, where, path.parent, allow_code, str(path))
     for task in found.tasks:
-        field = f"{where}: tasks.{task.name}"
-        with placed(field):
+        with placed(f"{where}: tasks.{task.name}"):
             task.check_ship()
     return found
 
@@ -182,19 +180,20 @@ def parse_suite(
             _check_data(table, place)
         task = _read_task(task_name, table, folder, place)
         tasks.append(replace(task, suite=source))
-    return Suite(name, tuple(tasks), source, _sha256(text), budget)
-
-
-def _sha256(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
+    return Suite(
+        name,
+        tuple(tasks),
+        source,
+        hashlib.sha256(text.encode()).hexdigest(),
+        budget,
+    )
 
 
 def _check_data(table: Mapping[str, Any], where: str) -> None:
     """Refuse a task that names code."""
     for name in ("environment", "rule"):
         text = str(table.get(name, ""))
-        names_code = ":" in text or text.endswith(".py")
-        if names_code:
+        if ":" in text or text.endswith(".py"):
             raise InputError(
                 f"{where}.{name}: expected no code, got '{text}'; if you trust the"
                 " suite: --allow-code"
@@ -214,16 +213,14 @@ def _read_task(
         options["sea"] = given.pop("sea")
     environment = read_environment(text, folder, field)
     options = {**environment.options, **options}
-    default_model = options.pop("model", None)
-    given["model"] = given.get("model", default_model)
+    given.setdefault("model", options.pop("model", None))
     for named in {"model", "ship", "why", "part", "rule"} & given.keys():
         check_text(given[named], f"{where}.{named}")
     check_table(given.get("judge", {}), f"{where}.judge")
     sweep = given.get("sweep", ())
     for k, point in enumerate(sweep, start=1):
         check_table(point, f"{where}.sweep-{k}")
-    limits = given.pop("limits", {})
-    given["limits"] = read_limits(limits, f"{where}.limits")
+    given["limits"] = read_limits(given.get("limits", {}), f"{where}.limits")
     given["true_ship"] = given.pop("ship", "")
     given["environment"] = environment.name
     given["options"] = options

@@ -21,6 +21,7 @@ from shipgym.envs.sb3 import ShipVecEnv
 from shipgym.errors import InputError
 
 ALGORITHMS = {"ppo": PPO, "sac": SAC}
+ACTIVATIONS = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
 
 
 class StaggeredShips(ShipVecEnv):
@@ -34,8 +35,7 @@ class StaggeredShips(ShipVecEnv):
         """Begin an episode in each row, each of them of another age."""
         observations: NDArray[np.float32] = super().reset()
         longest = self.vector_env.task.episode_steps
-        rows = np.arange(self.num_envs)
-        ages = rows * longest // self.num_envs
+        ages = np.arange(self.num_envs) * longest // self.num_envs
         self.vector_env.write("steps", ages)
         return observations
 
@@ -84,7 +84,10 @@ def make_agent(plan: TrainingPlan, base: Controller | None) -> Any:
         **sb3_arguments(plan.settings),
     )
     if base is not None and plan.algorithm == "sac":
-        begin_as_base(agent)
+        # the last layer is zero and adds nothing to the base (Silver et al. 2018,
+        # arXiv:1812.06298); PPO's is next to zero anyway
+        torch.nn.init.zeros_(agent.actor.mu.weight)
+        torch.nn.init.zeros_(agent.actor.mu.bias)
     return agent
 
 
@@ -121,24 +124,12 @@ def design_base(name: str, task: BenchmarkTask) -> Controller | None:
     return design(name, task)
 
 
-def begin_as_base(agent: SAC) -> None:
-    """Make the last layer of a policy zero, which then adds nothing to its base.
-
-    Source: Silver et al. 2018, arXiv:1812.06298. PPO's last layer is next to zero
-    anyway.
-    """
-    torch.nn.init.zeros_(agent.actor.mu.weight)
-    torch.nn.init.zeros_(agent.actor.mu.bias)
-
-
 def sb3_arguments(settings: LearningSettings) -> dict[str, Any]:
     """Keywords of the algorithm's class in stable-baselines3."""
     names = ["batch_size", "gamma", "ent_coef"]
     network: dict[str, Any] = {
         "net_arch": list(settings.net_arch),
-        "activation_fn": {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}[
-            settings.activation
-        ],
+        "activation_fn": ACTIVATIONS[settings.activation],
         # half of the time of small networks is Adam's otherwise
         "optimizer_kwargs": {"fused": True},
     }
@@ -167,6 +158,5 @@ def set_deviation(agent: Any, settings: LearningSettings) -> None:
     if hasattr(agent.policy, "log_std"):  # discrete orders have none
         done = min(agent.num_timesteps / settings.total_steps, 1.0)
         begin = settings.log_std_init
-        end = float(settings.log_std_end)
-        log_std = begin + done * (end - begin)
-        agent.policy.log_std.data.fill_(log_std)
+        change = float(settings.log_std_end) - begin
+        agent.policy.log_std.data.fill_(begin + done * change)

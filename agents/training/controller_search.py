@@ -135,7 +135,10 @@ def tune_controller(
 
     start = {setting.name: setting.start for setting in space}
     finalists = [start, found.best, found.mean]
-    unseen = unseen_episodes(kind, task, budget.episodes)
+    # twice the episodes of the search, which it has not seen
+    first = FIRST_SEED + SearchBudget.n_sets * budget.episodes
+    seeds = first + np.arange(2 * budget.episodes)
+    unseen = CandidateEpisodes(kind, task.design_task, seeds)
     costs = unseen.costs(finalists)
     winner = int(np.argmin(costs))
     if costs[winner] >= REFUSED:
@@ -158,15 +161,6 @@ def episodes_of(number: int, which_set: int) -> Integers:
     """Seeds of a set of so many episodes; after the last comes the first again."""
     first = FIRST_SEED + number * (which_set % SearchBudget.n_sets)
     return first + np.arange(number)
-
-
-def unseen_episodes(
-    kind: str, task: BenchmarkTask, searched_episodes: int
-) -> "CandidateEpisodes":
-    """Twice the episodes of a search, which it has not seen."""
-    first = FIRST_SEED + SearchBudget.n_sets * searched_episodes
-    seeds = first + np.arange(2 * searched_episodes)
-    return CandidateEpisodes(kind, task.design_task, seeds)
 
 
 def simplified(
@@ -221,7 +215,8 @@ def search(
     options = {
         "seed": 1 + seed,
         "verbose": -9,
-        "popsize": _generation(space),
+        # half more than the rule of Hansen 2016, eq. 48
+        "popsize": int(1.5 * (4 + 3.0 * np.log(len(space)))),
         "signals_filename": "",  # no settings from files in the working folder
     }
     strategy = cma.CMAEvolutionStrategy(np.zeros(len(space)), first_step, options)
@@ -253,18 +248,10 @@ def search(
     return SearchResult(best, mean, evaluations)
 
 
-def _generation(space: Sequence[Setting]) -> int:
-    """Candidates in a generation: half more than the rule of Hansen 2016, eq. 48."""
-    by_rule = 4 + 3.0 * np.log(len(space))
-    return int(1.5 * by_rule)
-
-
 def settings_at(point: Floats, space: Sequence[Setting]) -> dict[str, float]:
     """Settings at a point of the search, whose origin is the design."""
-    settings = {}
-    for setting, z in zip(space, point, strict=True):
-        settings[setting.name] = setting.at(float(z))
-    return settings
+    pairs = zip(space, point, strict=True)
+    return {setting.name: setting.at(float(z)) for setting, z in pairs}
 
 
 class CandidateEpisodes:
@@ -326,10 +313,8 @@ class CandidateEpisodes:
 
 def has_margin(controller: Controller) -> bool:
     """True if a loop has a gain margin of 1.5 and a phase margin of 20 degrees."""
-    least_gain_margin, least_phase_margin_deg = 1.5, 20.0
     margins = controller.margins
-    has_gain_margin = margins.gain_margin >= least_gain_margin
-    return has_gain_margin and margins.phase_margin_deg >= least_phase_margin_deg
+    return margins.gain_margin >= 1.5 and margins.phase_margin_deg >= 20.0
 
 
 def side_by_side(controllers: Sequence[Controller], ships_each: int) -> Controller:
@@ -346,7 +331,6 @@ def side_by_side(controllers: Sequence[Controller], ships_each: int) -> Controll
         gains[name] = np.repeat(values, ships_each)
     parts: dict[str, Any] = {"gains": gains}
     if first.has_autopilot:
-        guides: Sequence[Any] = controllers
-        led = [guide.autopilot for guide in guides]
+        led: list[Any] = [vars(guide)["autopilot"] for guide in controllers]
         parts["autopilot"] = side_by_side(led, ships_each)
     return replace(first, **parts)

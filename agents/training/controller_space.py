@@ -60,8 +60,12 @@ def search_space(kind: str, task: BenchmarkTask) -> list[Setting]:
 
     Raises InputError for a kind that has none, and for guidance without a path.
     """
-    check_choice(kind, searched_kinds(), "controller")
     made = controller_class(kind)
+    known = []
+    for one in controller_kinds():
+        if controller_class(one).settings_type is not None:
+            known.append(one)
+    check_choice(kind, known, "controller")
     left_out = [] if kind == "preview-lq" else [*QUIET]
     if not made.has_autopilot:
         return list(_own_space(made, task, left_out))
@@ -72,12 +76,6 @@ def search_space(kind: str, task: BenchmarkTask) -> list[Setting]:
     inner = _own_space(LQ, task, left_out)
     of_autopilot = [one._replace(name=INNER + one.name) for one in inner]
     return [*_own_space(made, task, heel), *of_autopilot]
-
-
-def searched_kinds() -> list[str]:
-    """Kinds of controllers that have settings to search."""
-    kinds = controller_kinds()
-    return [kind for kind in kinds if controller_class(kind).settings_type is not None]
 
 
 def _own_space(

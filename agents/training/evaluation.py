@@ -67,7 +67,7 @@ class TrainingResult:
         return {
             "configuration": self.plan.configuration(),
             "resumed_from": self.resumed_from,
-            "best": dict(self.best),
-            "yardsticks": dict(self.yardsticks),
-            "curve": list(self.curve),
+            "best": self.best,
+            "yardsticks": self.yardsticks,
+            "curve": self.curve,
         }

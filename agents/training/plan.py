@@ -188,19 +188,15 @@ def training_options(plan: TrainingPlan) -> dict[str, Any]:
     task = plan.task
     options = task.arguments
     if "bounded" not in options:
-        options["bounded"] = _bounded(plan)
+        is_bounded = plan.settings.reward == "bounded"
+        options["bounded"] = is_bounded
+        if is_bounded and task.environment not in SHORT_NAMES:
+            seeds = range(plan.training_seed, plan.training_seed + 50)
+            options["bounded"] = half_reward_cost(task, seeds)
     drawn = plan.settings.randomise == "covariance"
     if drawn and task.ship.covariance is not None:
         options.setdefault("model_uncertainty", "covariance")
     return options
-
-
-def _bounded(plan: TrainingPlan) -> bool | float:
-    """Return what the keyword `bounded` is for the ships that learn."""
-    if plan.settings.reward != "bounded" or plan.task.environment in SHORT_NAMES:
-        return plan.settings.reward == "bounded"
-    seeds = range(plan.training_seed, plan.training_seed + 50)
-    return half_reward_cost(plan.task, seeds)
 
 
 def check_same(

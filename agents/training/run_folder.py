@@ -38,6 +38,8 @@ def check_resumable(folder: Path, plan: TrainingPlan) -> None:
             f"{folder}: no run of training is there; leave --resume out to begin one"
         )
     content = read_json(path, "run file", "start a new run in another folder")
-    stored = content.get("configuration")
-    stored = check_table(stored, f"{path}: configuration")
+    stored = check_table(
+        content.get("configuration"),
+        f"{path}: configuration",
+    )
     check_same(plan.configuration(), stored, str(folder))

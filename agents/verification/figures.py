@@ -76,7 +76,17 @@ def criteria_panel(criteria: Mapping[str, Criterion]) -> Panel:
     rows = list(range(len(names)))
     end = len(names) - 0.5
     ends = [-0.5, end]
-    traces.append(_limit_line(ends))
+    limit = [100.0, 100.0]
+    traces.append(
+        line(
+            limit,
+            ends,
+            "IMO limit",
+            LIMIT,
+            1.8,
+            line_dash="dash",
+        )
+    )
     names_axis = axis(
         tickvals=rows,
         ticktext=names,
@@ -85,12 +95,6 @@ def criteria_panel(criteria: Mapping[str, Criterion]) -> Panel:
     )
     shares_axis = axis("per cent of the limit", rangemode="tozero", ticksuffix=" %")
     return Panel(traces, shares_axis, names_axis)
-
-
-def _limit_line(heights: list[float]) -> Any:
-    """The limit of all criteria, which is 100 per cent."""
-    limit = [100.0, 100.0]
-    return line(limit, heights, "IMO limit", LIMIT, 1.8, line_dash="dash")
 
 
 def _draws_of(criterion: Criterion, row: int, jitter: np.random.Generator) -> Any:
@@ -143,19 +147,14 @@ def step_panels(
         headings += _step_lines(t, np.degrees(heading), name, colour)
         rudders += _step_lines(t, np.degrees(rudder), name, colour)
 
-    headings.append(_set_course(t, step_deg))
+    ends = [t[0], t[-1]]
+    course = [step_deg, step_deg]
+    headings.append(line(ends, course, "set course", MUTED, 1.2, line_dash="dot"))
     rudder_axis = axis("rudder, deg", zero=True)
     return (
         Panel(headings, "time, s", "heading change, deg"),
         Panel(rudders, "time, s", rudder_axis),
     )
-
-
-def _set_course(t: Floats, step_deg: float) -> Any:
-    """Line of the course that is steered."""
-    ends = [t[0], t[-1]]
-    course = [step_deg, step_deg]
-    return line(ends, course, "set course", MUTED, 1.2, line_dash="dot")
 
 
 def _step_lines(t: Floats, angles: Floats, name: str, colour: str) -> list[Any]:

@@ -73,7 +73,10 @@ def refused_designs(found: Verification, fit: Fit) -> Refusals:
         return Refusals(refused)
     remedy = helpful_trial(fit)
     if len(lost) < len(found.pilots):
-        return Refusals(refused, run_next=remedy)
+        return Refusals(
+            refused,
+            run_next=remedy,
+        )
 
     for track in found.tracks:
         refused[track.key] = "what steers on its course loses control"

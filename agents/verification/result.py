@@ -132,15 +132,15 @@ class AutopilotResult:
     def metrics(self) -> dict[str, Any]:
         """The contents of metrics.json."""
         fit = self.identification
-        diagnostics = {}
-        for quantity, diagnosis in fit.diagnostics.items():
-            diagnostics[quantity] = diagnosis.to_dict()
         metrics: dict[str, Any] = {
             **fit.metrics,
             "stable": self.stable,
             "instability": self.instability,
             "refusal": self.refusal,
-            "diagnostics": diagnostics,
+            "diagnostics": {
+                quantity: diagnosis.to_dict()
+                for quantity, diagnosis in fit.diagnostics.items()
+            },
         }
         if self.verification is not None:
             metrics |= verification_metrics(self.verification)

@@ -50,7 +50,8 @@ def verify(
         seeds=seed + np.arange(draws),
         trials=trials,
     )
-    criteria = _assessed(loop)
+    assessed = assess_draws(model, counted("models drawn", loop.draws))
+    criteria = {name: one for name, one in assessed.items() if one.drawn is not None}
     unstable = ran_away(criteria)
     stable = [loop.draws[number] for number in np.flatnonzero(~unstable).tolist()]
 
@@ -58,7 +59,10 @@ def verify(
     for track in tracks:
         loop.look_at(lost_tracks(track))
     steered = sailed(loop, designed.controllers)
-    pilots = run_pilots(steered, [model, *stable])
+    pilots = []
+    for autopilot, episodes in counted("step responses", steered):
+        step = step_response(autopilot, [model, *stable], STEP_DEG)
+        pilots.append(Pilot(autopilot.kind, autopilot, episodes, step))
     return Verification(
         draws=draws,
         seed=seed,
@@ -71,12 +75,6 @@ def verify(
         tracks=tuple(loop.of_counted(track) for track in tracks),
         counted=loop.counted,
     )
-
-
-def _assessed(loop: ClosedLoop) -> dict[str, Criterion]:
-    """Criteria that the models can be held against."""
-    found = assess_draws(loop.model, counted("models drawn", loop.draws))
-    return {name: one for name, one in found.items() if one.drawn is not None}
 
 
 def ran_away(criteria: Mapping[str, Criterion]) -> Flags:
@@ -103,18 +101,6 @@ def keeps_course(model: ShipModel) -> bool:
         return is_course_stable(model)
     except InputError:
         return False
-
-
-def run_pilots(
-    steered: Sequence[tuple[Controller, Episodes]],
-    ships: Sequence[ShipModel],
-) -> list[Pilot]:
-    """Autopilots with the episodes of each and its step responses on ships."""
-    pilots = []
-    for autopilot, episodes in counted("step responses", steered):
-        step = step_response(autopilot, ships, STEP_DEG)
-        pilots.append(Pilot(autopilot.kind, autopilot, episodes, step))
-    return pilots
 
 
 def _rank(pilot: Pilot, counted: Flags) -> tuple[float, ...]:

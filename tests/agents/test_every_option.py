@@ -24,8 +24,8 @@ from shipgym import RecordEpisode, example_ship, load_model
 from tests.agents.small_suite import write_suite
 
 LINEAR = "--structure abkowitz --method ridge --set preprocessing=none --set alpha=0.01"
-GREY = "--structure grey-box --reference-model mariner"
-WRONG = "--structure abkowitz --reference-model mariner --set kernel=none-such"
+GREY = "--structure grey-box --set reference_model=mariner"
+WRONG = "--structure abkowitz --set reference_model=mariner --set kernel=none-such"
 TASK = "--task rough-path"
 #: Sizes at which a rollout of learning takes a moment.
 SMALL = "--set ships=2 --set n_steps=16 --set batch_size=16 --set evaluate_every=32"

@@ -64,8 +64,8 @@ def test_a_method_and_a_reference_ship_are_enough(ship_file):
             [
                 "--method",
                 "rm-svm",
-                "--reference-model",
-                "tanker",
+                "--set",
+                "reference_model=tanker",
                 "--structure",
                 "abkowitz",
             ],
