@@ -107,7 +107,13 @@ def load_suite(suite: str | Path = DEFAULT_SUITE, allow_code: bool = False) -> S
         return _shipped(where)
     path = Path(where).resolve()
     text = read_text(path, "TOML file of a suite", LARGEST_TOML)
-    found = parse_suite(text, where, path.parent, allow_code, str(path))
+    found = parse_suite(
+        text,
+        where,
+        path.parent,
+        allow_code,
+        source=str(path),
+    )
     for task in found.tasks:
         with placed(f"{where}: tasks.{task.name}"):
             task.check_ship()
@@ -220,7 +226,10 @@ def _read_task(
     sweep = given.get("sweep", ())
     for k, point in enumerate(sweep, start=1):
         check_table(point, f"{where}.sweep-{k}")
-    given["limits"] = read_limits(given.get("limits", {}), f"{where}.limits")
+    given["limits"] = read_limits(
+        given.get("limits", {}),
+        f"{where}.limits",
+    )
     given["true_ship"] = given.pop("ship", "")
     given["environment"] = environment.name
     given["options"] = options

@@ -93,7 +93,11 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
             self._outputs[dones] = 0.0
             observations, more, ends, latest = self._interval()
             # where an episode has ended, they are of the next one
-            rewards = rewards + np.where(dones, np.float32(0.0), more)
+            rewards = rewards + np.where(
+                dones,
+                np.float32(0.0),
+                more,
+            )
             for row in np.flatnonzero(~dones):
                 infos[row] = latest[row]
             dones = dones | ends

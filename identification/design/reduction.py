@@ -248,9 +248,15 @@ class ReducedIdentification:
     reduced: IdentificationResult
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, ready for JSON."""
+        """Plain values, ready for JSON; infinite errors are null."""
         full, reduced = self.full, self.reduced
-        equations = {q: _plain_path(one) for q, one in self.reductions.items()}
+        equations = {}
+        for q, reduction in self.reductions.items():
+            path = [asdict(step) for step in reduction.path]
+            for step in path:
+                errors = step["relative_errors"].items()
+                step["relative_errors"] = {name: finite(one) for name, one in errors}
+            equations[q] = path
         return {
             "structure": self.structure.name,
             "equations": equations,
@@ -263,15 +269,6 @@ class ReducedIdentification:
                 "reduced": reduced.metrics["trials"],
             },
         }
-
-
-def _plain_path(reduction: Reduction) -> list[dict[str, Any]]:
-    """The steps of a reduction, infinite errors as null."""
-    path = [asdict(step) for step in reduction.path]
-    for step in path:
-        errors = step["relative_errors"]
-        step["relative_errors"] = {name: finite(one) for name, one in errors.items()}
-    return path
 
 
 def identify_reduced(
@@ -336,25 +333,15 @@ def reduced_structure(
     Of forces, sway and yaw, which inertia couples, keep the
     terms that either needs.
     """
-    kept = {
-        q: {
-            term.name
-            for term, label in zip(
-                structure.equations[q], structure.names(q), strict=True
-            )
-            if label in reductions[q].terms
-        }
-        for q in structure.equations
-    }
+    kept = {}
+    for q, terms in structure.equations.items():
+        labels = zip(terms, structure.names(q), strict=True)
+        chosen = reductions[q].terms
+        kept[q] = {term.name for term, label in labels if label in chosen}
     if structure.quantity == "force" and {"v", "r"} <= kept.keys():
         kept["v"] = kept["r"] = kept["v"] | kept["r"]
-    equations = {
-        q: tuple(term for term in structure.equations[q] if term.name in names)
-        for q, names in kept.items()
-    }
+    equations = {}
+    for q, terms in structure.equations.items():
+        equations[q] = tuple(term for term in terms if term.name in kept[q])
     source = f"{structure.source}; reduced"
-    return replace(
-        structure,
-        source=source,
-        equations=equations,
-    )
+    return replace(structure, source=source, equations=equations)

@@ -61,7 +61,10 @@ def identify(
         from identification.pipeline.choice import identified
 
         announce(f"identifying {len(marked)} trials, some seconds")
-        result = identified(marked, asked)
+        result = identified(
+            marked,
+            asked,
+        )
     return with_provenance(result, sea)
 
 

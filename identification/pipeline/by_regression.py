@@ -197,8 +197,7 @@ def left_out_models(
     found = []
     for trial in range(n_trials):
         if fit.covariance is None:
-            found_by = (fit.estimators, problem.samples, [trial])
-            estimators, rows = without_trials(*found_by)
+            estimators, rows = without_trials(fit.estimators, problem.samples, [trial])
             own = with_coefficients(fit.model, estimators)
             covariance = _of_regression(estimators, rows, problem.blank)
         elif without is not None:
@@ -228,25 +227,21 @@ def evaluated(
     lost = [name for name, predicted in predictions.items() if predicted is None]
     seen = noise_and_waves(problem.used, model.travel_time)
     complete = {**provenance, **seen}
-    measured = {
-        trial.name: measured_indices(model, trial, predictions[trial.name])
-        for trial in problem.used
-    }
-    complete["measured"] = {
-        name: {index: asdict(value) for index, value in indices.items()}
-        for name, indices in measured.items()
-        if indices
-    }
+    measured = {}
+    for trial in problem.used:
+        indices = measured_indices(model, trial, predictions[trial.name])
+        if indices:
+            measured[trial.name] = {key: asdict(one) for key, one in indices.items()}
+    complete["measured"] = measured
     complete["steering"] = "estimated" if options.steering is None else "given"
     reasons = provenance["guard"].get("rejected", [])
     if lost:
         complete |= {"stable": False, "runs_away_on": lost}
         reasons = [f"trial {name!r}, open loop" for name in lost]
     stable = complete["stable"]
-    causes = f"runs away: {'; '.join(reasons)}"
     metrics: dict[str, Any] = {
         "stable": stable,
-        "instability": None if stable else causes,
+        "instability": None if stable else f"runs away: {'; '.join(reasons)}",
     }
     bias = rudder_bias(model, problem)
     if bias is not None:
@@ -315,9 +310,12 @@ class RegressionFit:
 
     def result(self, options: Options) -> IdentificationResult:
         """The model with provenance, uncertainty and predictions of all trials."""
+        made_by = self.method.name
+        if self.method.refinement is not None and self.fit.covariance is None:
+            made_by = DEFAULT_METHOD  # the start stayed
         provenance = provenance_of(
             options,
-            self._made_by,
+            made_by,
             self.fit,
             self.problem,
         )
@@ -327,12 +325,6 @@ class RegressionFit:
             self.fit, self.problem, provenance, options, self.without
         )
 
-    @property
-    def _made_by(self) -> str:
-        """Name of the method that made the numbers: the start's, where that stayed."""
-        stayed = self.method.refinement is not None and self.fit.covariance is None
-        return DEFAULT_METHOD if stayed else self.method.name
-
 
 def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationResult:
     """Fit the regression of each equation, guard the model, and refine it if asked.
@@ -340,10 +332,17 @@ def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationRe
     A structure without a constant is fitted again with one where the bias of the rudder
     differs from zero.
     """
-    method = options.table_method
-    if options.method is None and differentiates_heading(trials, options):
-        method = _by_heading(trials)
-    options = replace(options, method=method)
+    method = options.method
+    if method is None:
+        method = DEFAULT_METHOD
+        if differentiates_heading(trials, options):
+            # in wind, by which the heading drifts, by parts of trials
+            in_wind = any("wind_speed" in trial for trial in trials)
+            method = Refinement() if in_wind else whole_trials()
+    options = replace(
+        options,
+        method=method,
+    )
     found = fit_regression(trials, options)
     own, fit = with_rudder_bias(found, options)
     return fit.result(own)
@@ -361,13 +360,6 @@ def differentiates_heading(trials: Sequence[Trial], options: Options) -> bool:
         return False
     fitted = [trial for trial in trials if trial.use == "fit"]
     return all("r" in trial.derived and "psi" in trial for trial in fitted)
-
-
-def _by_heading(trials: Sequence[Trial]) -> Refinement:
-    """Output error of whole trials, in wind, by which the heading drifts, of parts."""
-    if any("wind_speed" in trial for trial in trials):
-        return Refinement()
-    return whole_trials()
 
 
 def with_rudder_bias(

@@ -50,7 +50,7 @@ from identification.progress import counted
 from identification.samples.problem import Problem, pieces
 from shipgym import InputError, ShipModel, Trial
 from shipgym.models.catalogue import fitted_box
-from shipgym.ships import GreyBox, Structure
+from shipgym.ships import GreyBox
 from shipgym.ships.structures import GREY_BOX, MMG
 
 TABLES = (
@@ -261,9 +261,14 @@ def by_kernel(
         )
     beneath = replace(options, kernel=None)
     problem = pose(trials, beneath)
-    _check_beneath(problem.table)
     reference = problem.blank
     box = problem.table
+    if set(box.equations) != set("uvr"):
+        raise InputError(
+            "kernel: expected a structure beneath it with equations of u, v and r, got"
+            f" {box.name!r} with those of {', '.join(box.equations)}; choose 'linear'"
+            " or 'abkowitz', or leave the kernel out"
+        )
     if not isinstance(box, GreyBox):
         reference = identified(trials, beneath).model
         method = (reference.provenance or {})["method"]
@@ -280,16 +285,6 @@ def by_kernel(
     provenance = provenance_of(options, method, fit, problem)
     provenance["kernel"] = found.report
     return with_uncertainty(fit, problem, provenance, options)
-
-
-def _check_beneath(table: Structure) -> None:
-    """Refuse a structure that cannot take a kernel."""
-    if set(table.equations) != set("uvr"):
-        raise InputError(
-            "kernel: expected a structure beneath it with equations of u, v and r, got"
-            f" {table.name!r} with those of {', '.join(table.equations)}; choose"
-            " 'linear' or 'abkowitz', or leave the kernel out"
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,9 +324,8 @@ class SimulationFit:
         model = self.model
         problem = replace(self.problem, blank=model)
         fit = _guard_report(model, {}, self.reasons)
-        provenance = provenance_of(options, MAP, fit, problem) | deepcopy(
-            self.fit.report
-        )
+        provenance = provenance_of(options, MAP, fit, problem)
+        provenance |= deepcopy(self.fit.report)
         prior = self.fit.prior
         return certain(model, fit, problem, provenance, options, self.without, prior)
 

@@ -162,11 +162,6 @@ class Options:
         if speed is not None:
             check_number(speed, "service_shaft_speed", above=0.0, hint="1/s")
 
-    @property
-    def table_method(self) -> Any:
-        """The method of a table of terms: the one that is named, if any."""
-        return DEFAULT_METHOD if self.method is None else self.method
-
 
 def name_of(value: Any) -> str:
     """The name of a model, a structure or a method, or of an estimator's class."""
@@ -232,10 +227,9 @@ ARGUMENTS = tuple(
 
 def stage_settings() -> dict[str, list[str]]:
     """Names of the settings of each stage but for the one that its name stands for."""
-    found = {
-        stage: [item.name for item in fields(kind)][1:]
-        for stage, kind in STAGES.items()
-    }
+    found = {}
+    for stage, kind in STAGES.items():
+        found[stage] = [item.name for item in fields(kind)][1:]
     of_methods = [option for method in METHODS for option in method_options(method)]
     found["method"] = list(dict.fromkeys(of_methods))
     return found
@@ -245,8 +239,10 @@ def option_names() -> dict[str, str]:
     """Full names of options by every name that they may be given."""
     found: dict[str, str] = {}
     for stage, settings in stage_settings().items():  # the method comes last
-        found |= {setting: f"{stage}.{setting}" for setting in settings}
-        found |= {f"{stage}.{setting}": f"{stage}.{setting}" for setting in settings}
+        for setting in settings:
+            name = f"{stage}.{setting}"
+            found[setting] = name
+            found[name] = name
         found[f"{stage}.{WORDS[stage]}"] = stage
     return found | {name: name for name in (*ARGUMENTS, *WORDS)}
 

@@ -66,12 +66,10 @@ def summary_table(fit: Fit) -> str:
 
 def result_card(fit: Fit) -> str:
     """The result in a few lines: verdict, held-out error, what next."""
-    return "\n".join(
-        [
-            f"{fit.model.name}: {how_identified(fit)}; {_verdict(fit)}",
-            held_out_error(fit),
-            "more: summary(), to_frame(), trials_frame(), model, metrics, save(folder)",
-        ]
+    return (
+        f"{fit.model.name}: {how_identified(fit)}; {_verdict(fit)}\n"
+        f"{held_out_error(fit)}\n"
+        "more: summary(), to_frame(), trials_frame(), model, metrics, save(folder)"
     )
 
 
@@ -84,10 +82,8 @@ def how_identified(fit: Fit) -> str:
 
 def _verdict(fit: Fit) -> str:
     guard = (fit.model.provenance or {}).get("guard", {})
-    verdict = "NOT STABLE: its predictions run away and are not to be used"
-    if fit.stable:
-        verdict = "stable"
-    return f"{verdict} ({guard.get('decision')})"
+    unstable = "NOT STABLE: its predictions run away and are not to be used"
+    return f"{'stable' if fit.stable else unstable} ({guard.get('decision')})"
 
 
 def kernel_text(report: Mapping[str, Any]) -> str:
@@ -129,15 +125,8 @@ def coefficient_rows(fit: Fit) -> list[CoefficientRow]:
         if error > 0.0:
             t = fixed(value / error, 1)
             significant = abs(value / error) >= 2.0
-        rows.append(
-            CoefficientRow(
-                name,
-                own,
-                deviation,
-                t,
-                significant,
-            )
-        )
+        row = CoefficientRow(name, own, deviation, t, significant)
+        rows.append(row)
     return rows
 
 
@@ -189,7 +178,10 @@ class IdentificationResult(Fit):
         value = list(self.coefficients.values())
         names = list(self.coefficients)
         error = [self.standard_errors.get(name) for name in names]
-        columns = {"value": value, "standard_error": error}
+        columns = {
+            "value": value,
+            "standard_error": error,
+        }
         frame = DataFrame(columns, index=names, dtype=float)
         frame["t"] = frame["value"] / frame["standard_error"]
         return frame
@@ -200,7 +192,10 @@ class IdentificationResult(Fit):
 
         rows = {}
         for name, metrics in self.metrics["trials"].items():
-            rows[name] = {"use": metrics["use"], **metrics["rmse"]}
+            rows[name] = {
+                "use": metrics["use"],
+                **metrics["rmse"],
+            }
         return DataFrame.from_dict(
             rows,
             orient="index",

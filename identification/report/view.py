@@ -140,13 +140,12 @@ def fit_view(fit: Fit) -> dict[str, Any]:
 
 def trial_figures(fit: Fit) -> dict[str, Any]:
     """Figures of the trials: of those fitted one, and of each that was held out."""
-    predictions = {
-        PurePath(trial.name).name: prediction_figure(
-            trial, fit.predictions.get(trial.name)
-        )
-        for trial in fit.trials
-        if trial.use == "validate"
-    }
+    predictions = {}
+    for trial in fit.trials:
+        if trial.use == "validate":
+            predicted = fit.predictions.get(trial.name)
+            name = PurePath(trial.name).name
+            predictions[name] = prediction_figure(trial, predicted)
     return {"overview": overview_figure(fit), "predictions": predictions}
 
 
@@ -174,11 +173,8 @@ def index_lines(metrics: Mapping[str, Any]) -> list[str]:
     for name, (words, unit) in INDICES.items():
         values = metrics.get(name)
         if values is not None:
-            found = " → ".join(
-                fixed(values[kind])
-                for kind in ("measured", "predicted", "closed_loop")
-                if kind in values
-            )
+            kinds = ("measured", "predicted", "closed_loop")
+            found = " → ".join(fixed(values[kind]) for kind in kinds if kind in values)
             lines.append(f"{words} {found} {unit}")
     return lines or [NONE]
 
