@@ -1,7 +1,5 @@
 """Identification of a ship file: its options, the user's, and its trials."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

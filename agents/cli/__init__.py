@@ -4,8 +4,6 @@ Exit codes: 0 done; 1 the work ran and failed its check; 2 wrong input or usage,
 one message on standard error and nothing written; 130 interrupted (Ctrl-C, SIGTERM).
 """
 
-from __future__ import annotations
-
 import os
 import sys
 

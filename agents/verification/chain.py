@@ -1,7 +1,5 @@
 """From recorded trials to a model, its certainty, verified autopilots and a report."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace

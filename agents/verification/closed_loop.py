@@ -5,8 +5,6 @@ that the ship was put through, or gathers speed without end on a straight course
 not count, since no autopilot steers the speed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 

@@ -1,7 +1,5 @@
 """Result of the whole chain: the model, its certainty and its autopilots."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Any
 

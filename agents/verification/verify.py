@@ -1,7 +1,5 @@
 """Autopilots designed on a model, and run over models drawn from its covariance."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial

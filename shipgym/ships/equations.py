@@ -6,8 +6,6 @@ state `shaft_acceleration(n, command, c, ship)`, and `SHIP`, which says the rest
 functions are plain Python; `shipgym.engine` compiles them.
 """
 
-from __future__ import annotations
-
 import importlib
 import math
 from collections import namedtuple

@@ -5,8 +5,6 @@ adaptive RM-SVM with minor rudder. Their equation 11 adds accelerations of two d
 ships; here those of the reference ship are converted back to the target first.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property

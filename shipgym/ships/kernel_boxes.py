@@ -7,8 +7,6 @@ Sun & Shi 2019). With a linear reference fitted to the same trials it is a kerne
 of its own, a black box.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache

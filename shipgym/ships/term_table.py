@@ -4,8 +4,6 @@ The same table serves identification (stacked over samples), simulation (compile
 state at a time) and the model file.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
