@@ -48,8 +48,7 @@ def verify(
         seeds=seed + np.arange(draws),
         trials=trials,
     )
-    assessed = assess_draws(model, counted("models drawn", loop.draws))
-    criteria = {name: one for name, one in assessed.items() if one.drawn is not None}
+    criteria = _assessed(loop)
     unstable = ran_away(criteria)
     stable = [loop.draws[number] for number in np.flatnonzero(~unstable).tolist()]
 
@@ -73,6 +72,12 @@ def verify(
         tracks=tuple(loop.of_counted(track) for track in tracks),
         counted=loop.counted,
     )
+
+
+def _assessed(loop: ClosedLoop) -> dict[str, Criterion]:
+    """Criteria that the models can be held against."""
+    found = assess_draws(loop.model, counted("models drawn", loop.draws))
+    return {name: one for name, one in found.items() if one.drawn is not None}
 
 
 def ran_away(criteria: Mapping[str, Criterion]) -> Flags:
