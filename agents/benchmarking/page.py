@@ -54,14 +54,13 @@ def write_page(result: BenchmarkResult, path: str | Path) -> None:
         metrics[task] = {name: METRICS[name] for name in METRICS if name in known}
     options = summary["options"]
     seeds = judging_seeds("ship", options["episodes"], options["seed"])
-    controllers = counted(len(result.ranking), "controller")
-    tasks = counted(summary["suite"]["n_tasks"], "task")
-    episodes = counted(options["episodes"], "episode")
     shown = {
         **summary,
         "lead": (
-            f"First: {result.ranking[0]}. {controllers} in {len(result.tasks)} of"
-            f" {tasks}, {episodes} of each set."
+            f"First: {result.ranking[0]}."
+            f" {counted(len(result.ranking), 'controller')} in {len(result.tasks)} of"
+            f" {counted(summary['suite']['n_tasks'], 'task')},"
+            f" {counted(options['episodes'], 'episode')} of each set."
         ),
         "failures": result.failures,
         "limits": limits,
@@ -70,8 +69,10 @@ def write_page(result: BenchmarkResult, path: str | Path) -> None:
         "sweeps": sweep_figure(result),
         "seeds": f"{seeds[0]} to {seeds[-1]}",
     }
-    page = render("agents.benchmarking/page.html", **shown)
-    write_text(page, target)
+    write_text(
+        render("agents.benchmarking/page.html", **shown),
+        target,
+    )
 
 
 def sweep_figure(result: BenchmarkResult) -> Any:

@@ -37,6 +37,7 @@ try:
     )
     from agents.cli.logs import look_command, new_ship_command
     from agents.cli.reproduction import reproduce_command
+    from agents.cli.terminal import answer, say, warn
     from agents.cli.training import train_command, tune_command
     from agents.cli.trials import trials_command
 except KeyboardInterrupt:  # Ctrl-C before any command began
@@ -89,7 +90,6 @@ def replay_command(
 
     Chart, time slider and time histories, several episodes overlaid.
     """
-    from agents.cli.terminal import answer, say
     from agents.rollouts.replay_page import write_replay
 
     write_replay(episodes, out)
@@ -103,7 +103,6 @@ def doctor_command() -> None:
     Exits with 1 if something does not work.
     """
     from agents.cli.doctor import examine_installation
-    from agents.cli.terminal import answer, say
 
     findings = examine_installation()
     answer({"findings": [finding._asdict() for finding in findings]})
@@ -141,12 +140,6 @@ for name, (command, example) in COMMANDS.items():
     app.command(name, epilog=epilog)(shared_options(command))
 
 
-def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    from agents.cli.terminal import warn
-
-    warn(str(message))
-
-
 def _unraisable(failed: Any) -> None:
     """Interrupt again after a function that a library in C called, as LLVM does.
 
@@ -164,7 +157,8 @@ def main() -> None:
         if isinstance(stream, TextIOWrapper):  # names of files may have any bytes
             stream.reconfigure(errors="backslashreplace")
     os.environ["PYTHONSAFEPATH"] = "1"  # for processes that libraries start
-    warnings.showwarning = _show_warning  # names in it come from files
+    # names in it come from files
+    warnings.showwarning = lambda message, *_, **__: warn(str(message))
     # joblib's, of a job that ended with an error, which is said anyway
     warnings.filterwarnings("ignore", "A worker stopped while some jobs")
     sys.unraisablehook = _unraisable

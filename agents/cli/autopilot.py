@@ -14,6 +14,7 @@ from agents.cli.command import (
     interrupted,
 )
 from agents.cli.identify_options import with_identify_options
+from agents.cli.terminal import answer, console, progress_bars, say, warn
 from shipgym.manoeuvres.quantiles import DRAWS
 
 if TYPE_CHECKING:
@@ -51,7 +52,6 @@ def autopilot_command(
     if the identified model is unstable, or no autopilot designed on it can be trusted;
     the report then says why.
     """
-    from agents.cli.terminal import progress_bars
     from agents.output import present
     from agents.verification.chain import build_autopilot
 
@@ -88,7 +88,6 @@ def _simpler_structures(found: IdentificationResult) -> str:
 
 def print_autopilot(result: AutopilotResult, report: Path, draws: int) -> None:
     """Print the result; fail for an unstable model or if all designs are refused."""
-    from agents.cli.terminal import answer, say, warn
     from identification.judging.warnings import model_warnings
 
     answer({**result.metrics, "report": str(report)})
@@ -101,7 +100,10 @@ def print_autopilot(result: AutopilotResult, report: Path, draws: int) -> None:
         )
     if result.refusal is not None:
         reason = result.refusal + _simpler_structures(result.identification)
-        fail(f"no autopilot is given: {reason}; see {report}", FAILED)
+        fail(
+            f"no autopilot is given: {reason}; see {report}",
+            FAILED,
+        )
 
     for warning in model_warnings(result.identification):
         warn(warning)
@@ -119,7 +121,6 @@ def _print_verification(
 ) -> None:
     """Print predictions, criteria, ranking and tracks."""
     from agents.cli import tables
-    from agents.cli.terminal import console, say
     from identification.judging.warnings import held_out_error
 
     identification = result.identification

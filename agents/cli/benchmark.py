@@ -14,6 +14,7 @@ from agents.cli.command import (
     Out,
     interrupted,
 )
+from agents.cli.terminal import answer, console, progress_bars, say, warn
 
 if TYPE_CHECKING:
     from agents.benchmarking.results import BenchmarkResult
@@ -69,7 +70,6 @@ def benchmark_command(
     from agents.benchmarking.page import write_page
     from agents.benchmarking.results import PARTS
     from agents.benchmarking.run import benchmark
-    from agents.cli.terminal import progress_bars, warn
 
     for given in controllers.split(","):
         source = given.rpartition("=")[2].strip()
@@ -107,7 +107,6 @@ def benchmark_command(
 def _print_result(result: BenchmarkResult, out: Path) -> None:
     """Print the ranking, or all of the summary."""
     from agents.cli.benchmark_tables import ranking_tables
-    from agents.cli.terminal import answer, console, say, warn
 
     answer(result.summary)
     for table in ranking_tables(result):

@@ -16,6 +16,8 @@ from typer import Argument, Option
 from typer.core import TyperGroup
 
 from agents.cli.parameters import take_parameters, typed_parameters
+from agents.cli.terminal import print_error, printing
+from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 
 FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130  # exit codes
 #: Words of the command line after `shipgym`.
@@ -63,7 +65,6 @@ def shared_options(command: Callable[..., None]) -> Callable[..., None]:
 
     @functools.wraps(command)
     def wrapped(*, as_json: bool = False, quiet: bool = False, **options: Any) -> None:
-        from agents.cli.terminal import printing
 
         try:
             with printing(as_json, quiet):
@@ -100,9 +101,6 @@ def interrupted(kept: str, *more: str) -> NoReturn:
 
 def report(error: Exception) -> int | None:
     """Print an expected error and return its exit code; None for an unexpected one."""
-    from agents.cli.terminal import print_error
-    from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
-
     if isinstance(error, InputError):
         print_error(str(error))
         return WRONG_INPUT
@@ -119,8 +117,6 @@ def report(error: Exception) -> int | None:
 
 def report_os_error(error: OSError) -> int:
     """Print what could not be read or written; the exit code."""
-    from agents.cli.terminal import print_error
-
     reason = error.strerror or error
     if error.filename is not None:
         longest = 200  # characters of a path
@@ -139,7 +135,5 @@ def report_os_error(error: OSError) -> int:
 
 def fail(message: str, code: int) -> NoReturn:
     """Print the message of an error and leave with an exit code."""
-    from agents.cli.terminal import print_error
-
     print_error(message)
     raise typer.Exit(code) from None

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
+from agents.cli.terminal import answer, say
+from shipgym.errors import InputError
+
 if TYPE_CHECKING:
     from agents.export.source import Source
 
@@ -40,11 +43,9 @@ def export_command(
 ) -> None:
     """Write an autopilot or a ship model as C99 or FMU, a learned policy as ONNX."""
     from agents.agent_file import load_agent
-    from agents.cli.terminal import answer, say
     from agents.export.fmu import check_fmu_name, write_fmu
     from agents.output import check_file, check_folder, whole_folder
     from agents.policies.onnx_export import onnx_model
-    from shipgym.errors import InputError
     from shipgym.files import write_bytes
 
     has_source = c is not None or fmu is not None
@@ -87,7 +88,6 @@ def _source(what: str, name: str | None, depth: float) -> Source:
     from agents.agent_file import list_pretrained, load_agent
     from agents.export.autopilot import autopilot_source
     from agents.export.ship_c99 import ship_source
-    from shipgym.errors import InputError
     from shipgym.files import kind_of
     from shipgym.models import load_model
 

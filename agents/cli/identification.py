@@ -9,6 +9,7 @@ from typer import Option
 
 from agents.cli.command import FAILED, Out, ShipFileArgument, fail
 from agents.cli.identify_options import with_identify_options
+from agents.cli.terminal import answer, console, progress_bars, say, warn
 
 if TYPE_CHECKING:
     from identification import IdentificationResult
@@ -38,7 +39,6 @@ def identify_command(
     Exits with 1 if the identified model is unstable, or predicts nothing.
     """
     from agents.cli.tables import prediction_table, selection_table
-    from agents.cli.terminal import answer, console, progress_bars, say
     from agents.identifying import identify_ship
     from agents.output import whole_folder
     from identification.judging.warnings import (
@@ -99,7 +99,6 @@ def _chosen(
 
 def _check_stable(result: IdentificationResult) -> None:
     """Fail for an unstable model, else warn of what has to be known."""
-    from agents.cli.terminal import warn
     from identification.judging.warnings import (
         model_warnings,
         why_unstable,
@@ -134,7 +133,6 @@ def advise_command(
     Prints by how much zigzags and turning circles, simulated
     on the model identified so far, would each reduce the error of a coefficient.
     """
-    from agents.cli.terminal import answer, progress_bars, say
     from agents.identifying import identify_ship
     from identification.design.experiment import advise
 
@@ -165,7 +163,6 @@ def reduce_command(
     the reduced model is unstable.
     """
     from agents.cli.tables import prediction_table
-    from agents.cli.terminal import answer, console, progress_bars, say
     from agents.identifying import reduce_ship
     from agents.output import whole_folder
     from identification.pipeline.result import FILES

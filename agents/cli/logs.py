@@ -8,7 +8,11 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 from typer import Argument, Exit, Option
+
+from agents.cli.terminal import answer, say, warn
+from shipgym.errors import InputError
 
 if TYPE_CHECKING:
     from shipgym.trials.guesses import ColumnGuess, RudderSide, TrialGuess
@@ -45,8 +49,6 @@ def new_ship_command(
 
     Guesses columns, units and signs, and reports the guesses.
     """
-    from agents.cli.terminal import answer, say, warn
-    from shipgym.errors import InputError
     from shipgym.files import write_text
     from shipgym.pages import render
 
@@ -76,7 +78,6 @@ def new_ship_command(
 
 def _check_again(path: Path) -> None:
     """Read all trials of a ship file; exit code 1 where one cannot be read."""
-    from agents.cli.terminal import answer, say
     from shipgym.trials.ship_file import ShipFile
 
     faults = ShipFile.load(path).faults()
@@ -191,8 +192,6 @@ def _entry(
 
 def _cut(guess: TrialGuess) -> str:
     """Runs between gaps, or "rudder" in a log that is idle for long; else empty."""
-    import numpy as np
-
     from shipgym.trials.cuts import active_stretches, runs
 
     trial = guess.trial
@@ -210,8 +209,6 @@ def _cut(guess: TrialGuess) -> str:
 
 def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
     """Logs read with guessed columns; the first has to be a log."""
-    from agents.cli.terminal import warn
-    from shipgym.errors import InputError
     from shipgym.trials.guesses import guess_trial
 
     first, *others = logs
@@ -226,8 +223,6 @@ def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
 
 def _service_speed(guessed: list[TrialGuess]) -> float | None:
     """Speed, m/s, that is exceeded for a tenth of the time in the fastest trial."""
-    import numpy as np
-
     trials = [one.trial for one in guessed if one.trial is not None]
     speeds = [float(np.quantile(one["u"], 0.9)) for one in trials if "u" in one]
     return max(speeds, default=None)
@@ -249,9 +244,7 @@ def look_command(
 
     Shows track, channels, repairs and the problems that were found.
     """
-    from agents.cli.terminal import answer, say, warn
     from agents.output import check_page
-    from shipgym.errors import InputError
     from shipgym.files import write_text
     from shipgym.pages.look import look_page, verdict
     from shipgym.trials.guesses import guess_trial

@@ -9,6 +9,8 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
+from agents.cli.terminal import AS_JSON, console
+
 HERE = Path(__file__).resolve()
 #: In the wheel beside this package (setup.py), in a checkout in its scripts.
 PLACES = HERE.parents[1] / "scripts", HERE.parents[2] / "scripts"
@@ -35,8 +37,6 @@ def reproduce_command(
     Shows the printed numbers, ours by the paper's method and at best, and whether the
     aim is met. Exits with 1 if an aim is missed.
     """
-    from agents.cli.terminal import AS_JSON, console
-
     folder = next(place for place in PLACES if place.is_dir())
     arguments = [sys.executable, str(folder / "reproduce.py"), paper]
     options = {"--markdown": markdown, "--table": table}

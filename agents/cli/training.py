@@ -9,6 +9,7 @@ from typer import Argument, Option
 
 from agents.cli.command import interrupted
 from agents.cli.parameters import with_options
+from agents.cli.terminal import answer, console, progress_bars, say, training_bar
 
 if TYPE_CHECKING:
     from agents.training.evaluation import TrainingResult
@@ -113,7 +114,6 @@ def train_command(
     A run killed at any moment continues with the same command and --resume from its
     last save, about a minute old at most.
     """
-    from agents.cli.terminal import training_bar
     from agents.training.plan import make_plan
     from agents.training.run_folder import RUN
     from agents.training.training import train
@@ -133,7 +133,6 @@ def train_command(
 def _print_result(result: TrainingResult, out: Path) -> None:
     """Print costs beside those of yardsticks, and where the agent was written."""
     from agents.cli.tables import plain_table
-    from agents.cli.terminal import answer, console, say
 
     agent = out / "agent.json"
     answer({**result.to_dict(), "agent": str(agent)})
@@ -178,7 +177,6 @@ def tune_command(
 
     If it is killed, the same command continues with the trials that are not done.
     """
-    from agents.cli.terminal import progress_bars
     from agents.training.plan import make_plan
     from agents.training.tuning import STUDY, tune
 
@@ -201,7 +199,6 @@ def tune_command(
 def print_tuning(study: Any, out: Path) -> None:
     """Print the best trial of a study and where its settings are."""
     from agents.cli.tables import number
-    from agents.cli.terminal import answer, say
     from agents.training.tuning import BEST
 
     path, best = out / BEST, study.best_trial

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
+from agents.cli.terminal import answer, console, progress_bars, say, warn
 from shipgym.manoeuvres.quantiles import DRAWS
 
 if TYPE_CHECKING:
@@ -32,7 +33,6 @@ def trials_command(
     model come with their 95 % intervals.
     """
     from agents.cli.standard_trials import standard_trials
-    from agents.cli.terminal import answer, progress_bars
     from agents.cli.trials_page import write_page
     from agents.output import check_page
     from shipgym.models import load_model
@@ -53,7 +53,6 @@ def trials_command(
 def _print_trials(trials: StandardTrials, page: Path | None) -> None:
     """Print tables of the standard manoeuvres, and where the page was written."""
     from agents.cli.tables import criteria_notes, criteria_table, manoeuvre_table
-    from agents.cli.terminal import console, say, warn
     from shipgym.manoeuvres.criteria import trials_to_run
 
     indices = manoeuvre_table(trials.indices)

@@ -34,14 +34,20 @@ def onnx_model(policy: Any) -> Any:
     text, constants = _graph(policy)
     model = onnx.parser.parse_model(f"{HEAD}\n{text}")
     for name, value in constants.items():
-        tensor = onnx.numpy_helper.from_array(np.asarray(value), name)
-        model.graph.initializer.append(tensor)
+        model.graph.initializer.append(
+            onnx.numpy_helper.from_array(np.asarray(value), name)
+        )
     fields, _ = policy.file_fields()
     for name in ("format", "kind", "network", "training"):
         del fields[name]  # says nothing to someone who runs the graph
-    metadata = {name: json.dumps(value) for name, value in fields.items()}
-    onnx.helper.set_model_props(model, metadata)
-    onnx.checker.check_model(model, full_check=True)
+    onnx.helper.set_model_props(
+        model,
+        {name: json.dumps(value) for name, value in fields.items()},
+    )
+    onnx.checker.check_model(
+        model,
+        full_check=True,
+    )
     return model
 
 

@@ -157,17 +157,15 @@ def step_response(
     """
     ships = _ships(models)
     first = ships[0]
-    largest_step_deg = 60.0  # so that an overshoot is not yet loss of control
+    # so that an overshoot is not yet loss of control
     check_number(
         step_deg,
         "step_deg",
-        at_least=-largest_step_deg,
-        at_most=largest_step_deg,
+        at_least=-60.0,
+        at_most=60.0,
     )
-    # duration of a step response, in times to travel one ship length
-    step_lengths = 16.0
     if duration is None:
-        duration = step_lengths * first.travel_time
+        duration = 16.0 * first.travel_time
     check_number(duration, "duration", above=0.0)
     asked = course_keeping_task()
     check_fits(controller, asked, first, f"model '{first.name}'")

@@ -151,8 +151,7 @@ def reversals(angle: Floats, counts: Flags) -> Floats:
         turns = rises | falls
 
         # the first movement of all is no reversal
-        has_moved = direction != 0.0
-        number += counted & turns & has_moved
+        number += counted & turns & (direction != 0.0)
         direction = np.select([rises, falls], [1.0, -1.0], default=direction)
 
         lowest = np.minimum(lowest, now)
@@ -166,9 +165,8 @@ def largest_heel(run: Rollout) -> Floats:
     """Largest angle of heel to either side, deg; NaN of a ship without roll."""
     if "phi" not in run.histories:
         return np.full(len(run.costs), np.nan)
-    angles = np.abs(during(run, "phi"))
-    largest: Floats = angles.max(axis=0, initial=0.0)
-    return np.asarray(np.degrees(largest))
+    angles = np.degrees(np.abs(during(run, "phi")))
+    return np.asarray(angles.max(axis=0, initial=0.0))
 
 
 def speed_lost(run: Rollout) -> Floats:
@@ -180,8 +178,7 @@ def speed_lost(run: Rollout) -> Floats:
 
 def path_following(run: Rollout) -> dict[str, Floats]:
     """Figures of path following of each episode, see `metrics`."""
-    is_outside = during(run, "in_corridor") == 0.0
-    outside = run.sailing & is_outside
+    outside = run.sailing & (during(run, "in_corridor") == 0.0)
     return {
         "cross_track_rmse_m": root_mean_square(run, "cross_track"),
         "outside_corridor": ratio(total(outside), run.steps),

@@ -106,7 +106,11 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
     def _interval(self) -> tuple[Numbers, Numbers, Flags, list[dict[str, Any]]]:
         """Sail one control interval with the agent's outputs."""
         self._in_force = toward(self._outputs, self._in_force, self.rate_limit)
-        orders = combined(self._proposed, self._in_force, self.authority)
+        orders = combined(
+            self._proposed,
+            self._in_force,
+            self.authority,
+        )
         self._base_state = after_order(self.base, self._base_state, orders)
         self.venv.step_async(orders)
         observations, rewards, dones, infos = self.venv.step_wait()

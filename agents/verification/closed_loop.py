@@ -78,8 +78,7 @@ def loses_too_many(lost: Flags, counted: Flags) -> bool:
 
     Where less than a quarter of the models counts, nothing is known.
     """
-    fewest = 0.25
-    if np.mean(counted) < fewest:
+    if np.mean(counted) < 0.25:
         return True
     return bool(np.mean(lost[counted]) > MOST_LOST)
 
@@ -118,9 +117,12 @@ def gathers_speed(model: ShipModel) -> bool:
     dt = model.travel_time / steps_per_length
     amidships = np.zeros(int(lengths * steps_per_length))
     try:
-        simulate(model, orders(model, amidships), dt)
+        simulate(
+            model,
+            orders(model, amidships),
+            dt,
+        )
     except UnstableModelError as error:
-        yaw_rate = error.state.get("r", 0.0)
-        turned = abs(yaw_rate) * model.travel_time
+        turned = abs(error.state.get("r", 0.0)) * model.travel_time
         return bool(turned < 1.0)
     return False

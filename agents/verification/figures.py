@@ -48,11 +48,9 @@ def in_words(criteria: Mapping[str, Criterion]) -> dict[str, Criterion]:
 def band(t: Floats, values: Floats, name: str, colour: str, **more: Any) -> Any:
     """The 95 % interval of `values`, shape (n_draws, n_samples), as a filled band."""
     low, high = band_95(values)
-    there_and_back = np.concatenate([t, t[::-1]])
-    outline = np.concatenate([high, low[::-1]])
     return line(
-        there_and_back,
-        outline,
+        np.concatenate([t, t[::-1]]),
+        np.concatenate([high, low[::-1]]),
         name,
         colour,
         0,
@@ -69,9 +67,7 @@ def criteria_panel(criteria: Mapping[str, Criterion]) -> Panel:
     traces = []
     names = []
     for row, (name, criterion) in enumerate(criteria.items()):
-        dots = _draws_of(criterion, row, jitter)
-        marks = _marks_of(criterion, row)
-        traces += [dots, *marks]
+        traces += [_draws_of(criterion, row, jitter), *_marks_of(criterion, row)]
         names.append(criterion_name(name, criterion))
     rows = list(range(len(names)))
     end = len(names) - 0.5
@@ -126,8 +122,7 @@ def _marks_of(criterion: Criterion, row: int) -> list[Any]:
         if value is not None:
             share = 100.0 * value / criterion.limit
             heights = [row - 0.32, row + 0.32]
-            mark = line([share, share], heights, name, colour, 2.2)
-            marks.append(mark)
+            marks.append(line([share, share], heights, name, colour, 2.2))
     return marks
 
 
@@ -160,11 +155,9 @@ def step_panels(
 def _step_lines(t: Floats, angles: Floats, name: str, colour: str) -> list[Any]:
     """The band of the models drawn below the line of the identified one."""
     own = line(t, angles[0], name, colour, 2.1)
-    drawn = angles[1:]
-    if not len(drawn):
+    if len(angles) == 1:
         return [own]
-    of_draws = band(t, drawn, name, colour, showlegend=False)
-    return [of_draws, own]
+    return [band(t, angles[1:], name, colour, showlegend=False), own]
 
 
 def track_panels(tracks: Mapping[str, Track], length: float) -> tuple[Panel, Panel]:

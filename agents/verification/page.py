@@ -37,9 +37,8 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
     data: dict[str, Any] = {}
     if found is not None:
         length = float(result.model.particulars["length"])
-        drawn = result_figures(result.identification, found, length)
         data = {
-            "figures": drawn,
+            "figures": result_figures(result.identification, found, length),
             "criteria": in_words(found.criteria),
             **designs_of(found),
         }
@@ -158,9 +157,7 @@ def result_figures(
 ) -> dict[str, Any]:
     """Figures of an identification and a verification by name."""
     drawn = found.panels(length)
-    criteria = drawn["criteria"]
-    n_criteria = len(found.criteria)
-    height = 46 * n_criteria + 100
+    height = 46 * len(found.criteria) + 100
     grid = {
         "shared_xaxes": True,
         "vertical_spacing": 0.06,
@@ -169,7 +166,7 @@ def result_figures(
     steps = [drawn["heading"], drawn["rudder"]]
     shown = {
         **trial_figures(fit),
-        "criteria": panels([criteria], height, left=190, hovermode="closest"),
+        "criteria": panels([drawn["criteria"]], height, left=190, hovermode="closest"),
         "steps": panels(steps, 500, outer=True, grid=grid),
     }
     if found.tracks:

@@ -75,10 +75,16 @@ class Verification:
         responses = {}
         for pilot in self.by_name:
             responses[pilot.name] = (pilot.step.heading, pilot.step.rudder)
-        t = self.pilots[0].step.t
-        heading, rudder = step_panels(t, responses, STEP_DEG)
-        criteria = criteria_panel(self.criteria)
-        shown = {"criteria": criteria, "heading": heading, "rudder": rudder}
+        heading, rudder = step_panels(
+            self.pilots[0].step.t,
+            responses,
+            STEP_DEG,
+        )
+        shown = {
+            "criteria": criteria_panel(self.criteria),
+            "heading": heading,
+            "rudder": rudder,
+        }
         if self.tracks:
             tracks = {track.key.upper(): track for track in self.tracks}
             track, error = track_panels(tracks, length)
@@ -169,19 +175,16 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
 
 def track_metrics(track: Track) -> dict[str, Any]:
     """Cross-track errors of one path autopilot on the identified and drawn models."""
-    own = track.largest[0]
     drawn = track.largest[1:]
     if not len(drawn):
         drawn = track.largest
-    not_arrived = ~track.arrived[1:]
-    gains = track.controller.gains
     return {
-        "gains": _floats(gains),
-        "cross_track_largest_m": float(own),
+        "gains": _floats(track.controller.gains),
+        "cross_track_largest_m": float(track.largest[0]),
         "cross_track_rmse_m": float(track.rms[0]),
         "cross_track_largest_m_quantile_95": upper_95(drawn),
         "arrived": bool(track.arrived[0]),
-        "not_arrived": int(not_arrived.sum()),
+        "not_arrived": int(np.sum(~track.arrived[1:])),
     }
 
 
@@ -189,7 +192,6 @@ def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
     """Gains and margins of one autopilot, and its episodes over the models drawn."""
     episodes = pilot.episodes
     rmse_deg = episodes.heading_rmse_deg
-    travel_deg_min = episodes.rudder_travel_deg_min
     return {
         "gains": _floats(pilot.controller.gains),
         "margins": _finite(asdict(pilot.controller.margins)),
@@ -198,7 +200,7 @@ def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
         "cost_quantile_95": upper_95(episodes.cost),
         "heading_rmse_deg_mean": float(np.mean(rmse_deg)),
         "heading_rmse_deg_quantile_95": upper_95(rmse_deg),
-        "rudder_travel_deg_min_mean": float(np.mean(travel_deg_min)),
+        "rudder_travel_deg_min_mean": float(np.mean(episodes.rudder_travel_deg_min)),
         "extrapolating_mean": float(np.mean(episodes.extrapolating)),
         "lost_control": int(np.sum(episodes.terminated)),
     }

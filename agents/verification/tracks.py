@@ -47,24 +47,19 @@ def track_task(model: ShipModel) -> Task:
     It is as much wider as she is slow to turn: by how far ahead she has to see an arc
     (`own_lead`), over what is usual.
     """
-    usual_lead = 2.5  # ship lengths
     try:
-        wider = max(1.0, own_lead(model, None) / usual_lead)
+        wider = max(1.0, own_lead(model, None) / 2.5)  # ship lengths
     except InputError:  # no LQ holds her; who leads her says so
         wider = 1.0
     # changes of course, to starboard positive
     turns_deg = (30.0, -60.0, 90.0, -90.0, 45.0)
     courses = np.radians(np.cumsum([0.0, *turns_deg]))
     directions = np.column_stack([np.cos(courses), np.sin(courses)])
-    leg_lengths = 12.0 * wider  # of each leg
-    legs = leg_lengths * model.particulars["length"] * directions
-    ends = np.cumsum(legs, axis=0)
-    waypoints = np.vstack([np.zeros(2), ends])
-    speed = 0.1 * model.particulars["speed"]
-    current = Current(speed, towards_deg=90.0)
+    legs = 12.0 * wider * model.particulars["length"] * directions
+    current = Current(0.1 * model.particulars["speed"], towards_deg=90.0)
     return Task.of(
         "PathFollowing",
-        waypoints=waypoints,
+        waypoints=np.vstack([np.zeros(2), np.cumsum(legs, axis=0)]),
         sea=Weather(current=current),
         turn_radius=4.0 * wider,
         episode_steps=int(3000 * wider),  # about twice what it takes
@@ -91,25 +86,18 @@ def keep_track(guide: Controller, models: Sequence[ShipModel]) -> Track:
     )
     run = rollout(guide, engine, seeds, record=recorded)
 
-    x = _of_first(run, run.histories["x"])
-    y = _of_first(run, run.histories["y"])
-    cross_track = _of_first(run, run.histories["cross_track"])
+    n_samples = int(run.steps[0]) + 1  # up to the end of the first ship's episode
+    own = {name: one[:n_samples, 0] for name, one in run.histories.items()}
     return Track(
         key=guide.kind,
         controller=guide,
         waypoints=np.reshape(task.settings.waypoints, (-1, 2)),
-        positions=np.column_stack([x, y]),
-        cross_track=cross_track,
+        positions=np.column_stack([own["x"], own["y"]]),
+        cross_track=own["cross_track"],
         largest=_largest_error(run),
         rms=root_mean_square(run, "cross_track"),
         arrived=succeeded(run) > 0.0,
     )
-
-
-def _of_first(run: Rollout, history: Floats) -> Floats:
-    """History of the first ship up to the end of her episode."""
-    n_samples = int(run.steps[0]) + 1
-    return history[:n_samples, 0]
 
 
 def _largest_error(run: Rollout) -> Floats:
