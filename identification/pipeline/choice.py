@@ -68,7 +68,7 @@ RM_SVM = "rm-svm"
 #: Tables that are fitted by output error, too, where they predict best by regression.
 REFINED = ("linear-steering", "steering7", "abkowitz", "cubic")
 #: Share of the ships drawn from a choice that may run away in a hard turn.
-MOST_THAT_RUN_AWAY = 0.25
+MOST_THAT_RUN_AWAY = 0.4
 
 
 class Choice(NamedTuple):
@@ -88,7 +88,7 @@ def select(trials: Sequence[Trial], options: Options) -> Choice:
     trials of less rudder. Candidates are compared by the likelihood of all channels
     that were measured (`judging.selection`). Those that run away in a hard turn are
     last. The choice is the one with the fewest coefficients within one standard error
-    of the paired difference from the best; one is passed over where a quarter of the
+    of the paired difference from the best; one is passed over where two fifths of the
     ships drawn from it run away in a hard turn, as the trials do not tell so many
     coefficients. A method other than the default is the only
     one, and what does not know a setting is refused; InputError where nothing can be
