@@ -120,26 +120,24 @@ def run_cell(entry: Entry, task: BenchmarkTask, options: Options) -> Cell:
 
 def job_of(entry: Entry, task: BenchmarkTask, options: Options) -> dict[str, Any]:
     """Return the job of a cell; it names all that the result depends on."""
-    task_files = {str(path): file_hash(path) for path in task.files}
     return {
         "task": task.to_dict(),
         "entry": entry.name,
         "source": entry.source,
-        "files": {**entry.fingerprint(task), **task_files},
+        "files": {
+            **entry.fingerprint(task),
+            **{str(path): file_hash(path) for path in task.files},
+        },
         "options": options._asdict(),
     }
 
 
 def read_cell(result: dict[str, Any]) -> Cell:
     """Return the cell of a job's result, whose arrays are lists."""
-    fields = dict(result)
-    sets = fields.pop("figures")
-    figures: dict[str, Figures] = {}
-    for on, found in sets.items():
-        figures[on] = {}
-        for name, values in found.items():
-            figures[on][name] = np.array(values)
-    return Cell(figures=figures, **fields)
+    figures = {}
+    for on, found in result["figures"].items():
+        figures[on] = {name: np.array(values) for name, values in found.items()}
+    return Cell(**{**result, "figures": figures})
 
 
 def run_job(job: dict[str, Any]) -> dict[str, Any]:

@@ -141,8 +141,8 @@ class Entry:
 
 def known_names() -> tuple[str, ...]:
     """Names that stand for a controller, other than files and functions."""
-    tuned_names = [TUNED + kind for kind in CLASSICAL]
-    return (*controller_kinds(), SHIPPED, RULE, *LEARNING_RULES, *tuned_names)
+    named = (*controller_kinds(), SHIPPED, RULE, *LEARNING_RULES)
+    return (*named, *(TUNED + kind for kind in CLASSICAL))
 
 
 def names_code(text: str) -> bool:

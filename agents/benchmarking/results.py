@@ -221,9 +221,7 @@ def collect(
 
 
 def _figures(cell: Mapping[str, Any]) -> dict[str, Any]:
-    figures = {}
-    for name, statistics in cell["metrics"].items():
-        figures[name] = statistics["mean"]
+    figures = {name: one["mean"] for name, one in cell["metrics"].items()}
     for part in ("cost", "score"):
         found = cell[part]
         figures[part] = found["value"]

@@ -172,8 +172,9 @@ def bridge_parameters(controller: Controller) -> BridgeParameters:
     scales = dict(
         zip(controller.observation_names, controller.observation_scales, strict=True)
     )
-    pilot = controller.autopilot if isinstance(controller, Guided) else controller
-    guide = controller.parameters if isinstance(controller, Guided) else Nothing()
+    pilot, guide = controller, Nothing()
+    if isinstance(controller, Guided):
+        pilot, guide = controller.autopilot, controller.parameters
     return BridgeParameters(
         dt=float(controller.design["dt"]),
         reach=float(scales["heading_error_integral"]),

@@ -139,16 +139,16 @@ class Structures:
         if isinstance(value, np.ndarray):
             array = self.free_name(name)
             inside = ",\n    ".join([literal(one) for one in value.tolist()])
-            head = f"static const double {array}[{len(value)}]"
-            self.texts.append(f"{head} = {{\n    {inside},\n}};\n")
+            self.texts.append(
+                f"static const double {array}[{len(value)}] = {{\n    {inside},\n}};\n"
+            )
             return array
         if not isinstance(value, tuple):
             return literal(value)
 
         deeper = f"{indent}    "
         lines = []
-        labels = self._labels_of(value)
-        for part, label in zip(value, labels, strict=True):
+        for part, label in zip(value, self._labels_of(value), strict=True):
             shown = self.initialiser(part, label.name, deeper)
             lines.append(f"{deeper}.{label.name} = {shown},\n")
         inside = "".join(lines) or f"{deeper}0\n"

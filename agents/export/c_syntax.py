@@ -83,10 +83,9 @@ def comment(text: str) -> str:
     A space parts what would end or begin a comment or stand for another character;
     characters that nobody sees are named, and a long text is cut.
     """
-    longest = 120
     shown = "".join([_seen(character) for character in text])
-    if len(shown) > longest:
-        shown = f"{shown[:longest]}..."
+    if len(shown) > 120:
+        shown = f"{shown[:120]}..."
     return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", shown)
 
 

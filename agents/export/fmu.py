@@ -65,19 +65,19 @@ def check_fmu_name(path: Path) -> None:
 def _texts(source: Source) -> dict[str, str]:
     """Texts of an FMU by their names in its archive."""
     name = source.name
-    token = uuid.uuid5(uuid.NAMESPACE_URL, source.header + source.source)
     wrapper = f"{name}_fmi.c"
     data = {
         **source._asdict(),
-        "token": str(token),
+        "token": uuid.uuid5(uuid.NAMESPACE_URL, source.header + source.source),
         "title": comment(source.title),
         "wrapper": wrapper,
         "variables": [*source.inputs.items(), *source.outputs.items()],
         "units": UNITS,
     }
-    texts = {}
-    for header in _headers():
-        texts[f"sources/{header.name}"] = header.read_text(encoding="utf-8")
+    texts = {
+        f"sources/{header.name}": header.read_text(encoding="utf-8")
+        for header in _headers()
+    }
     if f"sources/{name}.h" in texts:
         raise InputError(
             f"name: expected another than that of a header of FMI, got {name!r}; give"
@@ -114,9 +114,10 @@ def _compiled(files: dict[str, str], name: str, path: Path) -> bytes:
             "compiler: expected gcc on Linux, or the compiler that CC names, got none;"
             " an FMU holds a binary"
         )
-    flags = ("-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off")
-    sources = (f"{name}_fmi.c", f"{name}.c")
-    command = [compiler, *flags, *sources, "-o", "ship.so", "-lm"]
+    command = [
+        *(compiler, "-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off"),
+        *(f"{name}_fmi.c", f"{name}.c", "-o", "ship.so", "-lm"),
+    ]
     with draft_folder(path.with_suffix(".build")) as folder:
         for file, text in files.items():
             if file.startswith("sources/"):

@@ -9,7 +9,7 @@ import numpy as np
 from agents.controllers.interface import model_hash
 from agents.controllers.memory import from_columns
 from agents.export.c_structures import Label, leaf_paths
-from agents.export.c_syntax import comment
+from agents.export.c_syntax import comment, free
 from agents.export.source import (
     Source,
     Variables,
@@ -169,12 +169,13 @@ def _term_labels(dynamics: Any) -> list[Label]:
         for term in terms:
             letters = re.sub(r"\|(\w+)\|", r"abs_\1_", term.name)
             letters = re.sub(r"\W", "_", letters, flags=re.ASCII).strip("_")
-            name = f"{equation}dot_{letters[:30]}"
-            while name in labels:
-                name += "_"
+            name = free(f"{equation}dot_{letters[:30]}", labels)
             power = 0
             if dynamics.normalisation == "prime":
                 power = speed_power(equation, term)
             product = f"{term.name} U^{power}" if power else term.name
-            labels[name] = Label(name, f"of {product} in the rate of {equation}")
+            labels[name] = Label(
+                name,
+                f"of {product} in the rate of {equation}",
+            )
     return list(labels.values())

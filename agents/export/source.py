@@ -71,23 +71,27 @@ def checked_name(name: str) -> str:
     long.
     """
     allowed = re.sub(r"\W", "_", name, flags=re.ASCII)
-    starts_with_letter = re.match("[A-Za-z]", allowed)
-    # characters, so that what is made of it stays within the 63 of C99
-    longest_name = 31
-    if not starts_with_letter or allowed in KEYWORDS or len(allowed) > longest_name:
+    # at most 31 characters, so that what is made of it stays within the 63 of C99
+    if not re.fullmatch(r"[A-Za-z]\w{,30}", allowed) or allowed in KEYWORDS:
         raise InputError(
-            f"name: expected at most {longest_name} letters, digits and underscores, a"
-            f" letter first, and no word of C, got {name[:60]!r}; give another with"
-            " --name"
+            "name: expected at most 31 letters, digits and underscores, a letter"
+            f" first, and no word of C, got {name[:60]!r}; give another with --name"
         )
     return allowed
 
 
 def render(template: str, name: str = "", **data: Any) -> str:
     """A text made from one of the templates."""
-    made = _environment().get_template(template)
-    version = shipgym.__version__
-    return made.render(**data, name=name, NAME=name.upper(), version=version)
+    return (
+        _environment()
+        .get_template(template)
+        .render(
+            **data,
+            name=name,
+            NAME=name.upper(),
+            version=shipgym.__version__,
+        )
+    )
 
 
 def c_source(template: str, name: str, **data: Any) -> str:
@@ -98,8 +102,7 @@ def c_source(template: str, name: str, **data: Any) -> str:
 
 def hash_text(sha256: str) -> str:
     """A hash as it may stand in a string of C; another text is no hash."""
-    is_hash = re.fullmatch("[0-9a-f]{64}", sha256)
-    return sha256 if is_hash else "unknown"
+    return sha256 if re.fullmatch("[0-9a-f]{64}", sha256) else "unknown"
 
 
 def _calls(text: str, function: str) -> bool:
@@ -115,9 +118,6 @@ def _environment() -> Environment:
         trim_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters |= {
-        "c": literal,
-        "comment": comment,
-    }
+    environment.filters |= {"c": literal, "comment": comment}
     environment.tests["calling"] = _calls
     return environment

@@ -72,8 +72,7 @@ class Translator:
         """Definitions of the functions that were asked for, and of what they call."""
         kept: list[str] = []
         for name, text in reversed(self._texts.items()):
-            call = f"{name}("
-            is_called = any(call in other for other in kept)
+            is_called = any(f"{name}(" in other for other in kept)
             if name in self._wanted or is_called:
                 kept.append(text)
         return kept[::-1]
@@ -311,11 +310,10 @@ class FunctionWriter:
             return test
         if yes is False and no is True:
             return self.applied(np.invert, test)
-        kind = self.c.structures.kind_of(yes)
         made = self.node(
             "%s ? %s : %s",
             (test, yes, no),
-            kind,
+            self.c.structures.kind_of(yes),
         )
         made.sign = "?"
         return made
@@ -362,7 +360,11 @@ class FunctionWriter:
                 return whole
         inside = ", ".join([f".{label.name} = %s" for label in kind.labels])
         text = f"({self.c.structures.type(kind)}){{{inside or 0}}}"
-        return self.node(text, parts, kind)
+        return self.node(
+            text,
+            parts,
+            kind,
+        )
 
     # Text.
 

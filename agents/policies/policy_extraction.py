@@ -172,9 +172,8 @@ def _options(keywords: Mapping[str, Any]) -> dict[str, Any]:
     )
     for name, value in keywords.items():
         is_of_package = name == "task" and value in TASKS
-        if name in running or is_of_package:
-            continue
-        options[name] = as_json(value)
+        if name not in running and not is_of_package:
+            options[name] = as_json(value)
     return options
 
 

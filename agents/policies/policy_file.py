@@ -92,8 +92,8 @@ def _network(value: Any, tensors: Tensors) -> Network:
         )
     layers = []
     for i in range(len(sizes) - 1):
-        weight, bias = tensors[f"layers.{i}.weight"], tensors[f"layers.{i}.bias"]
-        layers.append(Layer(weight, bias))
+        parts = [tensors[f"layers.{i}.{part}"] for part in Layer._fields]
+        layers.append(Layer(*parts))
     return Network(
         tuple(layers),
         activation=str(table.get("activation")),

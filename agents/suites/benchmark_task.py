@@ -42,8 +42,7 @@ class Scenario(NamedTuple):
 
     def scales(self) -> list[tuple[str, float]]:
         """Return what the task shows of the ship, and in which units."""
-        shown = self.task.observed(self.ship)
-        return [(one.name, one.scale) for one in shown]
+        return [(one.name, one.scale) for one in self.task.observed(self.ship)]
 
 
 @dataclass(frozen=True)
@@ -201,15 +200,9 @@ class BenchmarkTask:
         named: list[Any] = [self.environment, self.model, self.true_ship]
         for options in (self.options, self.judge, *self.sweep):
             named += options.values()
-        suffixes = (".py", ".json")
-        files = []
-        for name in named:
-            if not isinstance(name, str):
-                continue
-            path = Path(name)
-            if path.suffix in suffixes and path.is_file():
-                files.append(path)
-        return files
+        paths = [Path(name) for name in named if isinstance(name, str)]
+        known = [path for path in paths if path.suffix in (".py", ".json")]
+        return [path for path in known if path.is_file()]
 
     def to_dict(self) -> dict[str, Any]:
         """Return its fields, ready for JSON."""

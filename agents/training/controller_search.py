@@ -83,12 +83,6 @@ class FoundSettings:
     seconds: float
 
 
-#: Mean cost of each of some settings, shape (n,); `REFUSED` of those without a design.
-Costs = Callable[[Sequence[Mapping[str, float]]], Floats]
-#: Called with the number of a set of episodes, from 0.
-Renew = Callable[[int], None]
-
-
 class SearchResult(NamedTuple):
     """Where a search ended, as settings."""
 
@@ -187,12 +181,12 @@ def simplified(
 
 
 def search(
-    costs: Costs,
+    costs: Callable[[Sequence[Mapping[str, float]]], Floats],
     space: Sequence[Setting],
     budget: SearchBudget,
     *,
     seed: int = 0,
-    renew: Renew | None = None,
+    renew: Callable[[int], None] | None = None,
 ) -> SearchResult:
     """Search for the least cost by CMA-ES, within a budget.
 
@@ -201,17 +195,17 @@ def search(
     Parameters
     ----------
     costs : callable
-        Mean cost of each of some settings, shape (n,).
+        Mean cost of each of some settings, shape (n,); `REFUSED` of those without a
+        design.
     space : sequence of Setting
     budget : SearchBudget
     seed : int
     renew : callable, optional
-        Exchanges the episodes that costs are of; called before the first of every six
-        generations.
+        Exchanges the episodes that costs are of; called with the number of a set, from
+        0, before the first of every six generations.
     """
     cma: Any = library("cma", "tune", "searching settings needs it")
     began = time.process_time()
-    first_step = 0.5  # of the steps of the settings
     options = {
         "seed": 1 + seed,
         "verbose": -9,
@@ -219,7 +213,12 @@ def search(
         "popsize": int(1.5 * (4 + 3.0 * np.log(len(space)))),
         "signals_filename": "",  # no settings from files in the working folder
     }
-    strategy = cma.CMAEvolutionStrategy(np.zeros(len(space)), first_step, options)
+    # half of the steps of the settings at first
+    strategy = cma.CMAEvolutionStrategy(
+        np.zeros(len(space)),
+        0.5,
+        options,
+    )
     best = {setting.name: setting.start for setting in space}
     least = np.inf
     evaluations = 0
@@ -300,10 +299,8 @@ class CandidateEpisodes:
             return np.asarray(means[: len(controllers)])
 
         engine = self._engine(n_episodes)
-        means = []
-        for controller in controllers:
-            means.append(episode_costs(controller, engine, self.seeds).mean())
-        return np.array(means)
+        alone = [episode_costs(one, engine, self.seeds) for one in controllers]
+        return np.asarray(np.mean(alone, axis=1))
 
     def _engine(self, n_ships: int) -> Engine:
         if n_ships not in self._engines:

@@ -114,8 +114,10 @@ def lowest_cost(plan: TrainingPlan, trial: Any) -> float:
 
     def report(now: TrainingProgress) -> None:
         if now.evaluated and now.steps > 0:
-            number = now.steps // plan.settings.evaluate_every
-            trial.report(now.cost, number)
+            trial.report(
+                now.cost,
+                now.steps // plan.settings.evaluate_every,
+            )
             if trial.should_prune():
                 raise optuna.TrialPruned
 

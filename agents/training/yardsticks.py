@@ -63,7 +63,12 @@ def half_reward_cost(task: BenchmarkTask, seeds: ArrayLike) -> float:
     """
     engine = task.engine(len(np.asarray(seeds)))
     random = RandomActions(task.task.n_commands)
-    run = rollout(random, engine, seeds, record=["cost"])
+    run = rollout(
+        random,
+        engine,
+        seeds,
+        record=["cost"],
+    )
     median = float(np.median(run.histories["cost"][1:][run.sailing]))
     usual = task.task.definition.half_reward_cost
     earned = usual / (usual + max(median, 0.0))

@@ -157,7 +157,10 @@ def _step_lines(t: Floats, angles: Floats, name: str, colour: str) -> list[Any]:
     own = line(t, angles[0], name, colour, 2.1)
     if len(angles) == 1:
         return [own]
-    return [band(t, angles[1:], name, colour, showlegend=False), own]
+    return [
+        band(t, angles[1:], name, colour, showlegend=False),
+        own,
+    ]
 
 
 def track_panels(tracks: Mapping[str, Track], length: float) -> tuple[Panel, Panel]:

@@ -217,11 +217,15 @@ def _usual_method(structure: str, options: Options) -> Any:
 def identified(trials: Sequence[Trial], options: Options) -> IdentificationResult:
     """Identify by the route that the options ask for."""
     if options.kernel is not None:
-        return by_kernel(trials, options, options.kernel)
+        return by_kernel(
+            trials,
+            options,
+            options.kernel,
+        )
     if options.structure == AUTO:
         return by_selection(trials, options)
     if options.structure == MMG:
-        return by_simulation(trials, options)
+        return fit_simulation(trials, options).result(options)
     return by_regression(trials, options)
 
 
@@ -330,13 +334,8 @@ class SimulationFit:
         return certain(model, fit, problem, provenance, options, self.without, prior)
 
 
-def by_simulation(trials: Sequence[Trial], options: Options) -> IdentificationResult:
-    """The MMG form by its simulation error."""
-    return fit_simulation(trials, options).result(options)
-
-
 def fit_simulation(trials: Sequence[Trial], options: Options) -> SimulationFit:
-    """The fit of `by_simulation`, before its predictions."""
+    """The MMG form by its simulation error, before its predictions."""
     options = checked_mmg(options)
     problem = pose(trials, options)
     asked = options.prior or PriorKnowledge()

@@ -36,17 +36,16 @@ from shipgym.plots.trials import history_panel, path_panel
 RUDDER = "#9aa5b1"
 
 
-def regression_figures(fit: Fit) -> dict[str, Figure]:
-    """The L-curves, where a rank was chosen by them."""
+def regression_figure(fit: Fit) -> Figure | None:
+    """The L-curves, where a rank was chosen by them; else None."""
     shown = [
         _l_curve_panel(q, estimator)
         for q, estimator in fit.estimators.items()
         if isinstance(estimator, TruncatedLSSVM) and estimator.selection != "full"
     ]
     if not shown:
-        return {}
-    figure = panels(shown, 360, len(shown), outer=True, left=70, hovermode="closest")
-    return {"l-curve": figure}
+        return None
+    return panels(shown, 360, len(shown), outer=True, left=70, hovermode="closest")
 
 
 def _l_curve_panel(q: str, estimator: TruncatedLSSVM) -> Panel:
@@ -186,7 +185,7 @@ def report_page(fit: Fit) -> str:
     InputError if plotly is not installed.
     """
     instability = why_unstable(fit)
-    figures: dict[str, Any] = {"regression": regression_figures(fit)}
+    figures: dict[str, Any] = {"regression": regression_figure(fit)}
     if instability is None:
         figures |= trial_figures(fit)
     return render(
