@@ -142,6 +142,9 @@ def read_cell(result: dict[str, Any]) -> Cell:
 
 def run_job(job: dict[str, Any]) -> dict[str, Any]:
     """Do a job of `job_of`, in any process; a `Cell` as a dict."""
-    entry = Entry(job["entry"], job["source"])
-    task = BenchmarkTask(**job["task"])
-    return asdict(run_cell(entry, task, Options(**job["options"])))
+    cell = run_cell(
+        Entry(job["entry"], job["source"]),
+        BenchmarkTask(**job["task"]),
+        Options(**job["options"]),
+    )
+    return asdict(cell)

@@ -81,9 +81,9 @@ class BenchmarkResult:
             own = self.to_frame().query("controller == @name and failure != ''")
             for failure, rows in own.groupby("failure", sort=False):
                 tasks = ", ".join(rows["task"].unique())
-                count = rows["failed"].sum()
                 failures.append(
-                    f"{name} in {tasks}: {failure} ({count} episodes failed)"
+                    f"{name} in {tasks}: {failure} ({rows['failed'].sum()} episodes"
+                    " failed)"
                 )
         return failures
 
@@ -192,8 +192,14 @@ def collect(
             f"controllers: no controller could run any task; '{entries[0].name}' in"
             f" '{tasks[0].name}': {own[0].refused}"
         )
-    names = [entry.name for entry in entries]
-    computed = Summary(suite, tasks, names, cells, rules, options)
+    computed = Summary(
+        suite,
+        tasks,
+        [entry.name for entry in entries],
+        cells,
+        rules,
+        options,
+    )
     by_task = computed.by_task()
     source = Path(suite.source)
     summary = {

@@ -57,9 +57,13 @@ class Summary:
                 cell = self.cells[name, task.name]
                 if not cell.refused:
                     tables.append(cell.table(name, task.name, self.options))
-        table = pd.concat(tables, ignore_index=True)
-        figures = table.columns.difference(KEYS)
-        return table.astype(dict.fromkeys(figures, np.float64))
+        table = pd.concat(
+            tables,
+            ignore_index=True,
+        )
+        return table.astype(
+            dict.fromkeys(table.columns.difference(KEYS), np.float64),
+        )
 
     def costs(self, name: str, on: str, part: str = "") -> dict[str, Floats]:
         """Costs of a controller by task, those of a part if it is given.
@@ -166,5 +170,8 @@ def _metrics(episodes: pd.DataFrame) -> dict[tuple[str, ...], dict[str, Any]]:
 def _sort_key(total: Mapping[str, Any]) -> tuple[float, ...]:
     """Return what controllers are sorted by: tasks, limits, cost."""
     cost = total["mean_cost"]
-    is_beyond = bool(total["exceeding"])
-    return (-total["tasks"], is_beyond, np.inf if cost is None else cost)
+    return (
+        -total["tasks"],
+        bool(total["exceeding"]),
+        np.inf if cost is None else cost,
+    )

@@ -119,8 +119,7 @@ def report_os_error(error: OSError) -> int:
     """Print what could not be read or written; the exit code."""
     reason = error.strerror or error
     if error.filename is not None:
-        longest = 200  # characters of a path
-        print_error(f"{str(error.filename)[:longest]}: {reason}")
+        print_error(f"{str(error.filename)[:200]}: {reason}")
         return WRONG_INPUT
     if error.errno not in (EPIPE, ENOSPC, EBADF):
         print_error(str(reason))

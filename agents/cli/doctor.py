@@ -26,8 +26,10 @@ class Finding(NamedTuple):
 
     def line(self) -> Text:
         """One line for the terminal."""
-        mark = (f"{self.state:<6}", COLOURS[self.state])
-        return Text.assemble(mark, f"  {self.what:<20} {self.detail}")
+        return Text.assemble(
+            (f"{self.state:<6}", COLOURS[self.state]),
+            f"  {self.what:<20} {self.detail}",
+        )
 
 
 def examine_installation() -> list[Finding]:
@@ -109,8 +111,7 @@ def name_finding(name: str) -> Finding:
     """
     what = f"import {name}"
     packages = importlib.metadata.packages_distributions().get(name, ())
-    strange = set(packages) - {"shipgym"}
-    others = sorted(strange)
+    others = sorted(set(packages) - {"shipgym"})
     if others:
         return Finding(
             what,
@@ -119,4 +120,8 @@ def name_finding(name: str) -> Finding:
             " environment without",
         )
 
-    return Finding(what, "fine", str(Path(shipgym.__file__).parents[1] / name))
+    return Finding(
+        what,
+        "fine",
+        str(Path(shipgym.__file__).parents[1] / name),
+    )

@@ -39,8 +39,7 @@ def reproduce_command(
     """
     folder = next(place for place in PLACES if place.is_dir())
     arguments = [sys.executable, str(folder / "reproduce.py"), paper]
-    options = {"--markdown": markdown, "--table": table}
-    for option, value in options.items():
+    for option, value in {"--markdown": markdown, "--table": table}.items():
         if value is not None:
             arguments += [option, str(value)]
     if AS_JSON.get():
@@ -48,6 +47,9 @@ def reproduce_command(
     elif console.quiet:
         arguments.append("--quiet")
     # Python finds what the program imports in the program's own folder
-    environment = {**os.environ, "PYTHONSAFEPATH": ""}
-    done = subprocess.run(arguments, env=environment, check=False)
+    done = subprocess.run(
+        arguments,
+        env={**os.environ, "PYTHONSAFEPATH": ""},
+        check=False,
+    )
     raise typer.Exit(done.returncode)

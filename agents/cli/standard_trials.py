@@ -107,8 +107,7 @@ def _simulate(model: ShipModel, manoeuvres: Mapping[str, Manoeuvre]) -> _Nominal
         try:
             run = manoeuvre.sail(model)
             nominal.runs[name] = run
-            indices = manoeuvre.indices(run)
-            nominal.indices[name] = asdict(indices)
+            nominal.indices[name] = asdict(manoeuvre.indices(run))
         except (InputError, ManoeuvreError, UnstableModelError) as error:
             nominal.refused[name] = str(error)
             last_error = error

@@ -171,8 +171,9 @@ def criteria_notes(criteria: Mapping[str, Criterion]) -> list[str]:
             notes.append(f"{name}: {criterion.note}")
         drawn = criterion.drawn
         if drawn is not None and drawn.lost_in_words:
-            lost = drawn.lost_in_words
-            notes.append(f"{name}: {lost}, which are not in its interval")
+            notes.append(
+                f"{name}: {drawn.lost_in_words}, which are not in its interval"
+            )
     return notes
 
 

@@ -39,8 +39,7 @@ def _section(
     for manoeuvre in family:
         for index in trials.indices[manoeuvre]:
             by_manoeuvre = [trials.indices[other].get(index) for other in family]
-            words = readable_index(index)
-            rows[words] = by_manoeuvre
+            rows[readable_index(index)] = by_manoeuvre
     refused = {key: why for key, why in trials.refused.items() if key in family}
     return {
         "name": name,
@@ -60,8 +59,7 @@ def _figures(
     figures = []
     for number, (key, run) in enumerate(runs.items()):
         manoeuvre = family[key]
-        title = key[0].upper() + key[1:]
-        caption = f"{title}. {manoeuvre.caption}"
+        caption = f"{key[0].upper()}{key[1:]}. {manoeuvre.caption}"
         figures.append((f"{name}-{number}", manoeuvre_figure(run), caption))
     if runs:
         caption = "Paths from above, north up, in metres."

@@ -270,8 +270,9 @@ def check_closed_form(part: Any) -> None:
     """Refuse what does not steer by its `law` alone; InputError lists what does."""
     if isinstance(part, Controller) and part.is_closed_form():
         return
-    kinds = controller_kinds()
-    closed = [kind for kind in kinds if controller_class(kind).is_closed_form()]
+    closed = [
+        kind for kind in controller_kinds() if controller_class(kind).is_closed_form()
+    ]
     name = getattr(part, "name", type(part).__name__)
     raise InputError(
         "controller: expected a closed-form law, which can be written as C, got"

@@ -41,8 +41,9 @@ class Struct(NamedTuple):
     @property
     def name(self) -> str:
         """Name of the record."""
-        n = len(self.kinds)
-        return self.record.__name__ if is_record(self.record) else f"Tuple{n}"
+        if is_record(self.record):
+            return str(self.record.__name__)
+        return f"Tuple{len(self.kinds)}"
 
     def made(self, values: Any) -> Any:
         """A record, or tuple, of values."""
@@ -107,8 +108,7 @@ class Structures:
     def type(self, kind: Any) -> str:
         """C type of a kind; a structure is written when it is first needed."""
         if not isinstance(kind, Struct):
-            numbers = {float: "double", bool: "bool"}
-            return numbers.get(kind, "const double *")
+            return {float: "double", bool: "bool"}.get(kind, "const double *")
         if kind not in self.types:
             self.declare(kind, self.free_name(kind.name))
         return self.types[kind]

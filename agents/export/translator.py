@@ -195,8 +195,12 @@ class FunctionWriter:
         }
         for name, value in named_globals(function, self.c.hooks):
             names[name] = self.in_c(value)
-        defaults = function.__defaults__
-        return FunctionType(function.__code__, names, function.__name__, defaults)
+        return FunctionType(
+            function.__code__,
+            names,
+            function.__name__,
+            function.__defaults__,
+        )
 
     def in_c(self, value: Any) -> Any:
         """What a global of the function stands for."""

@@ -24,8 +24,7 @@ DEAD_BAND = np.radians(0.5)  # the rudder has turned round once it came back by 
 
 def recorded_for_metrics(task: Task) -> tuple[str, ...]:
     """Names of what a rollout has to record for `metrics`."""
-    states = ("psi", "u", "delta", "phi", "set_point")
-    return (*states, *task.info_names)
+    return ("psi", "u", "delta", "phi", "set_point", *task.info_names)
 
 
 def worst_step_cost(task: Task) -> float:
@@ -56,8 +55,7 @@ def metrics(run: Rollout) -> dict[str, Floats]:
     if {"cross_track", "in_corridor"} <= run.histories.keys():
         followed = path_following(run)
     success = succeeded(run)
-    failed = success == 0.0
-    lost = run.terminated & failed
+    lost = run.terminated & (success == 0.0)
     return {
         **costs(run),
         **steering(run),
@@ -90,8 +88,7 @@ def succeeded(run: Rollout) -> Floats:
     if "heading_error" not in run.task.info_names:
         # a task of a user's own, which charges ships that are lost
         lost = total(during(run, "reward_end")) < 0.0
-    kept = ~(lost | run.failed)
-    return kept.astype(np.float64)
+    return np.where(lost | run.failed, 0.0, 1.0)
 
 
 def costs(run: Rollout) -> dict[str, Floats]:
@@ -99,8 +96,7 @@ def costs(run: Rollout) -> dict[str, Floats]:
     parts = {}
     for name in run.task.reward_parts:
         part = name.removeprefix("reward_")
-        rewards = total(during(run, name))
-        parts[f"cost_{part}"] = -rewards
+        parts[f"cost_{part}"] = -total(during(run, name))
 
     # an episode in which the policy failed is charged as one that was lost
     steps_left = run.task.episode_steps - run.steps
@@ -124,10 +120,9 @@ def steering(run: Rollout) -> dict[str, Floats]:
     n_reversals = reversals(rudder, run.sailing)
     moved = np.abs(np.diff(rudder, axis=0))
     moved[~run.sailing] = 0.0
-    travel_deg = np.degrees(total(moved))
     return {
         "heading_rmse_deg": np.degrees(heading_rmse),
-        "rudder_travel_deg_min": ratio(travel_deg, minutes),
+        "rudder_travel_deg_min": ratio(np.degrees(total(moved)), minutes),
         "rudder_reversals_min": ratio(n_reversals, minutes),
     }
 

@@ -84,8 +84,10 @@ def _chart(runs: Mapping[str, Episode], trials: Mapping[str, Trial]) -> Figure:
     ships = list(range(first_ship, len(panel.traces)))
     frames = {}
     for time in np.linspace(0.0, end, FRAMES).tolist():
-        hulls = [_hull(run, time) for run in runs.values()]
-        frames[f"{time:.1f}"] = {"data": hulls, "traces": ships}
+        frames[f"{time:.1f}"] = {
+            "data": [_hull(run, time) for run in runs.values()],
+            "traces": ships,
+        }
     figure.frames = [{"name": name, **frame} for name, frame in frames.items()]
     return _with_slider(figure, list(frames))
 

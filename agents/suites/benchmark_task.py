@@ -132,8 +132,7 @@ class BenchmarkTask:
     @property
     def sets(self) -> tuple[str, ...]:
         """Its sets of episodes, of `SETS`."""
-        judged = bool(self.true_ship or self.judge)
-        known = SETS if judged else SETS[:2]
+        known = SETS if self.true_ship or self.judge else SETS[:2]
         return known + tuple(f"sweep-{k}" for k in range(1, len(self.sweep) + 1))
 
     def scenario(self, on: str) -> Scenario:

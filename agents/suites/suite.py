@@ -184,8 +184,12 @@ def parse_suite(
         table = check_table(value, place, FIELDS)
         if not allow_code:
             _check_data(table, place)
-        task = _read_task(task_name, table, folder, place)
-        tasks.append(replace(task, suite=source))
+        tasks.append(
+            replace(
+                _read_task(task_name, table, folder, place),
+                suite=source,
+            )
+        )
     return Suite(
         name,
         tuple(tasks),

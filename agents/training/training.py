@@ -142,8 +142,8 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
         """Learn to the end."""
         log = []
         if self.folder is not None and find_spec("tensorboard"):
-            path = self.folder / run_folder.TENSORBOARD
-            log.append(TensorBoardOutputFormat(str(path)))
+            path = str(self.folder / run_folder.TENSORBOARD)
+            log.append(TensorBoardOutputFormat(path))
         self.agent.set_logger(Logger(None, log))
         left = self.plan.settings.total_steps - self.steps
         try:

@@ -64,8 +64,10 @@ def tune(
         if trial.number > 0:
             settings = suggested(settings, trial, fixed)
         trial.set_user_attr("settings", settings.to_dict())
-        tried = replace(plan, settings=settings)
-        return lowest_cost(tried, trial)
+        return lowest_cost(
+            replace(plan, settings=settings),
+            trial,
+        )
 
     def after(study: Any, trial: Any) -> None:
         finished = trial.state is optuna.trial.TrialState.COMPLETE
@@ -121,8 +123,8 @@ def lowest_cost(plan: TrainingPlan, trial: Any) -> float:
             if trial.should_prune():
                 raise optuna.TrialPruned
 
-    result = train(plan, on_progress=report)
-    return min(float(one["cost"]) for one in result.curve if one["steps"] > 0)
+    curve = train(plan, on_progress=report).curve
+    return min(float(one["cost"]) for one in curve if one["steps"] > 0)
 
 
 def _ended(study: Any) -> int:

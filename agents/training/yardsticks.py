@@ -28,8 +28,11 @@ class RandomActions:
 
     def predict(self, observation: Any, state: Any = None, *_: Any) -> Any:
         """Command as `Policy.predict`, whatever is observed."""
-        shape = (len(observation), self.n_commands)
-        commands = self.random.uniform(-self.largest, self.largest, shape)
+        commands = self.random.uniform(
+            -self.largest,
+            self.largest,
+            (len(observation), self.n_commands),
+        )
         return commands.astype(np.float32), state
 
 

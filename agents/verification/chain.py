@@ -126,8 +126,7 @@ def write_agents(result: AutopilotResult, folder: Path) -> None:
     for autopilot in autopilots:
         key = autopilot.key
         if key not in found.refused:
-            path = folder / f"{key}.json"
-            autopilot.controller.save(path)
+            autopilot.controller.save(folder / f"{key}.json")
 
 
 def write_findings(result: AutopilotResult, folder: Path) -> None:

@@ -41,8 +41,7 @@ class ClosedLoop:
     @property
     def counted(self) -> Flags:
         """Models that count, shape (n_draws,)."""
-        n_draws = len(self.draws)
-        counted = np.ones(n_draws, dtype=np.bool_)
+        counted = np.ones(len(self.draws), dtype=np.bool_)
         for number, possible in self.possible.items():
             counted[number] = possible
         return counted
@@ -59,8 +58,10 @@ class ClosedLoop:
         """Find out which models that a design lost are possible, shape (n_draws,)."""
         for number in np.flatnonzero(lost).tolist():
             if number not in self.possible:
-                draw = self.draws[number]
-                self.possible[number] = is_possible(draw, self.trials)
+                self.possible[number] = is_possible(
+                    self.draws[number],
+                    self.trials,
+                )
 
     def of_counted(self, track: Track) -> Track:
         """Track of the identified model and of the models that count."""
@@ -112,15 +113,13 @@ def gathers_speed(model: ShipModel) -> bool:
 
     One that turns off its course before may still be steered.
     """
-    lengths = 100.0
     steps_per_length = 30
-    dt = model.travel_time / steps_per_length
-    amidships = np.zeros(int(lengths * steps_per_length))
+    amidships = np.zeros(100 * steps_per_length)
     try:
         simulate(
             model,
             orders(model, amidships),
-            dt,
+            model.travel_time / steps_per_length,
         )
     except UnstableModelError as error:
         turned = abs(error.state.get("r", 0.0)) * model.travel_time

@@ -145,10 +145,9 @@ def step_panels(
     ends = [t[0], t[-1]]
     course = [step_deg, step_deg]
     headings.append(line(ends, course, "set course", MUTED, 1.2, line_dash="dot"))
-    rudder_axis = axis("rudder, deg", zero=True)
     return (
         Panel(headings, "time, s", "heading change, deg"),
-        Panel(rudders, "time, s", rudder_axis),
+        Panel(rudders, "time, s", axis("rudder, deg", zero=True)),
     )
 
 

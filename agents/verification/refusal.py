@@ -81,8 +81,10 @@ def refused_designs(found: Verification, fit: Fit) -> Refusals:
     for track in found.tracks:
         refused[track.key] = "what steers on its course loses control"
     names = ", ".join([key.upper() for key in lost])
-    of_first = refused[found.pilots[0].key]
-    return Refusals(refused, f"{names}: {of_first}; run {remedy}")
+    return Refusals(
+        refused,
+        f"{names}: {refused[found.pilots[0].key]}; run {remedy}",
+    )
 
 
 def lost_control(found: Verification, episodes: Episodes) -> str | None:

@@ -102,11 +102,10 @@ def keep_track(guide: Controller, models: Sequence[ShipModel]) -> Track:
 
 def _largest_error(run: Rollout) -> Floats:
     """Largest cross-track error of each ship after the start, m, shape (n,)."""
-    settled_lengths = 6.0  # way after the start that does not count
-    settled = settled_lengths * run.model.particulars["length"]
+    # way after the start that does not count
+    settled = 6.0 * run.model.particulars["length"]
     made_good = run.histories["distance_made_good"][1:]
     counts = run.sailing & (made_good > settled)
 
     off_track = np.abs(run.histories["cross_track"][1:])
-    counted = np.where(counts, off_track, 0.0)
-    return np.asarray(counted.max(axis=0))
+    return np.asarray(np.where(counts, off_track, 0.0).max(axis=0))

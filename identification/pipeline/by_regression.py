@@ -114,8 +114,11 @@ def with_uncertainty(
     model = replace(fit.model, covariance=covariance)
     if options.uncertainty.model_error:
         again = without if is_yaw_alone(model) else None
-        left_out = left_out_models(fit, problem, model, again)
-        error = model_error(model, left_out, problem.used)
+        error = model_error(
+            model,
+            left_out_models(fit, problem, model, again),
+            problem.used,
+        )
         model = replace(model, covariance=error["factor"] ** 2 * covariance)
         provenance["model_error"] = error
     return certain(
@@ -300,10 +303,9 @@ class RegressionFit:
             samples = self.problem.samples
             estimators, _ = without_trials(self.fit.estimators, samples, trials)
             return with_coefficients(self.fit.model, estimators)
-        others = self.problem.without(trials)
         return _refined(
             self.fit,
-            others,
+            self.problem.without(trials),
             self.method,
             rounds=1,
         ).model
@@ -399,5 +401,10 @@ def _refined(
 
     from identification.models.output_error import refine
 
-    memory = MEMORY * problem.blank.travel_time
-    return refine(fit, problem, method.refinement, memory, rounds)
+    return refine(
+        fit,
+        problem,
+        method.refinement,
+        MEMORY * problem.blank.travel_time,
+        rounds,
+    )

@@ -284,8 +284,11 @@ def by_kernel(
         table=found.model.table,
         samples=found.samples,
     )
-    reasons = reasons_unstable(found.model, problem.used)
-    fit = _guard_report(found.model, found.estimators, reasons)
+    fit = _guard_report(
+        found.model,
+        found.estimators,
+        reasons_unstable(found.model, problem.used),
+    )
     provenance = provenance_of(options, method, fit, problem)
     provenance["kernel"] = found.report
     return with_uncertainty(fit, problem, provenance, options)
@@ -330,8 +333,15 @@ class SimulationFit:
         fit = _guard_report(model, {}, self.reasons)
         provenance = provenance_of(options, MAP, fit, problem)
         provenance |= deepcopy(self.fit.report)
-        prior = self.fit.prior
-        return certain(model, fit, problem, provenance, options, self.without, prior)
+        return certain(
+            model,
+            fit,
+            problem,
+            provenance,
+            options,
+            self.without,
+            self.fit.prior,
+        )
 
 
 def fit_simulation(trials: Sequence[Trial], options: Options) -> SimulationFit:

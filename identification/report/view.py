@@ -206,9 +206,9 @@ def write_report(fit: Fit, folder: str | Path) -> None:
     try:
         import plotly  # noqa: F401
     except ModuleNotFoundError:
-        remedy = "pip install 'shipgym[report]'"
         warnings.warn(
-            f"plotly is not installed, so report.html was not written: {remedy}",
+            "plotly is not installed, so report.html was not written: pip install"
+            " 'shipgym[report]'",
             stacklevel=2,
         )
         return
