@@ -14,66 +14,61 @@ from agents.cli.terminal import answer, console, progress_bars, say, training_ba
 if TYPE_CHECKING:
     from agents.training.evaluation import TrainingResult
 
-Algorithm = Annotated[str, Argument(metavar="ALGORITHM", help="ppo or sac.")]
-Environment = Annotated[
-    str | None,
-    Option(
-        help=(
-            "course-keeping (default), path-following, encounter, an environment id,"
-            " module:id, or the file of your own task."
-        )
-    ),
-]
-Model = Annotated[
-    str | None,
-    Option(help="A model file, or the name of a shipped model; default: mariner."),
-]
-Sea = Annotated[str | None, Option(help="calm (default), slight, moderate or rough.")]
-TaskName = Annotated[
-    str | None, Option(help="A benchmark task, instead of --env, --model and --sea.")
-]
-EnvironmentOptions = Annotated[
-    list[str] | None,
-    Option(
-        "--option",
-        metavar="NAME=VALUE",
-        help="Any other argument of the environment; repeatable.",
-    ),
-]
-TotalSteps = Annotated[
-    int | None,
-    Option(
-        min=1, help="Decisions that an agent learns from; default: as in the settings."
-    ),
-]
-Settings = Annotated[
-    Path | None,
-    Option(metavar="FILE.TOML", help="Settings that override the tuned ones."),
-]
 Seed = Annotated[int, Option(min=0, max=799, help="Random seed.")]
-Setting = Annotated[
-    list[str] | None,
-    Option(
-        "--set",
-        metavar="SETTING=VALUE",
-        help=(
-            "A setting, never varied by `tune`; repeatable. base=none learns from"
-            " scratch."
-        ),
-    ),
-]
 
 
 def learning_options(
-    algorithm: Algorithm,
-    env: Environment = None,
-    model: Model = None,
-    sea: Sea = None,
-    task: TaskName = None,
-    environment_options: EnvironmentOptions = None,
-    total_steps: TotalSteps = None,
-    settings: Settings = None,
-    set_: Setting = None,
+    algorithm: Annotated[str, Argument(metavar="ALGORITHM", help="ppo or sac.")],
+    env: Annotated[
+        str | None,
+        Option(
+            help=(
+                "course-keeping (default), path-following, encounter, an environment"
+                " id, module:id, or the file of your own task."
+            )
+        ),
+    ] = None,
+    model: Annotated[
+        str | None,
+        Option(help="A model file, or the name of a shipped model; default: mariner."),
+    ] = None,
+    sea: Annotated[
+        str | None, Option(help="calm (default), slight, moderate or rough.")
+    ] = None,
+    task: Annotated[
+        str | None,
+        Option(help="A benchmark task, instead of --env, --model and --sea."),
+    ] = None,
+    environment_options: Annotated[
+        list[str] | None,
+        Option(
+            "--option",
+            metavar="NAME=VALUE",
+            help="Any other argument of the environment; repeatable.",
+        ),
+    ] = None,
+    total_steps: Annotated[
+        int | None,
+        Option(
+            min=1,
+            help="Decisions that an agent learns from; default: as in the settings.",
+        ),
+    ] = None,
+    settings: Annotated[
+        Path | None,
+        Option(metavar="FILE.TOML", help="Settings that override the tuned ones."),
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        Option(
+            "--set",
+            metavar="SETTING=VALUE",
+            help=(
+                "A setting, never varied by `tune`; repeatable. base=none learns from"
+                " scratch."
+            ),
+        ),
+    ] = None,
 ) -> dict[str, Any]:
     """Arguments of `make_plan` that `train` and `tune` are given."""
     from shipgym.files import named_values
