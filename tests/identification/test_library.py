@@ -41,7 +41,7 @@ def test_mariner_tls_svm_is_what_its_trials_give():
     factors = [
         one.provenance["model_error"]["factor"] for one in (result.model, shipped)
     ]
-    assert factors == pytest.approx([1.0, 1.4898], rel=0.02)
+    assert factors == pytest.approx([1.064, 1.4898], rel=0.01)
     scaled = (factors[0] / factors[1]) ** 2 * shipped.covariance
     np.testing.assert_allclose(result.model.covariance, scaled, rtol=0.05)
 
