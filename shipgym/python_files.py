@@ -172,3 +172,10 @@ def nested_code(code: CodeType) -> Iterator[CodeType]:
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
             yield from nested_code(constant)
+
+
+def file_options(task: Any) -> dict[str, Any]:
+    """Keywords that the file of a task names in `OPTIONS`; none for another task."""
+    if not str(task).endswith(".py"):
+        return {}
+    return dict(vars(load_file(Path(task))).get("OPTIONS", {}))

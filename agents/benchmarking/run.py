@@ -20,6 +20,7 @@ from agents.suites.suite import (
 )
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
+from shipgym.tasks.definition import no_worst_cost
 
 
 def benchmark(
@@ -72,6 +73,8 @@ def benchmark(
     entries = read_entries(controllers)
     the_suite = load_suite(suite, allow_code)
     selected = the_suite.select(tasks)
+    for task in selected:
+        _check_losses(task)
     check_whole(episodes, "episodes", at_least=1, at_most=N_EPISODES)
     check_whole(seed, "seed", at_least=0, at_most=9999)
     check_whole(runs, "runs", at_least=1)
@@ -105,6 +108,17 @@ def benchmark(
             if not resume:
                 shutil.rmtree(folder / PARTS, ignore_errors=True)
             raise
+
+
+def _check_losses(task: BenchmarkTask) -> None:
+    """Refuse a task in which a lost ship costs nothing more, as losing would pay."""
+    definition = task.task.definition
+    if definition.worst_cost is no_worst_cost:
+        raise InputError(
+            f"{task.name}: expected worst_cost(settings) in {definition.source}, the"
+            " largest cost of a step, which a lost ship pays for each step that is"
+            " left; got none"
+        )
 
 
 def _rule(task: BenchmarkTask, entries: Sequence[Entry]) -> Entry:

@@ -120,8 +120,7 @@ def train_command(
     except KeyboardInterrupt:
         if not (out / RUN).is_file():
             raise
-        kept = "what was learned up to the last save"
-        interrupted(f"{kept} is kept in {out}; go on with", "--resume")
+        interrupted(f"what was learned is kept in {out}; go on with", "--resume")
     _print_result(result, out)
 
 

@@ -84,11 +84,7 @@ def succeeded(run: Rollout) -> Floats:
     if "success" in run.histories:
         reached: Floats = during(run, "success").max(axis=0, initial=0.0)
         return reached
-    lost = run.terminated
-    if "heading_error" not in run.task.info_names:
-        # a task of a user's own, which charges ships that are lost
-        lost = total(during(run, "reward_end")) < 0.0
-    return np.where(lost | run.failed, 0.0, 1.0)
+    return np.where(run.terminated | run.failed, 0.0, 1.0)
 
 
 def costs(run: Rollout) -> dict[str, Floats]:

@@ -21,6 +21,7 @@ from shipgym.checks import check_choice, check_whole
 from shipgym.envs.environment import PACE
 from shipgym.envs.episode import as_json
 from shipgym.errors import InputError
+from shipgym.python_files import file_options
 
 #: Seeds below those that are scored: of training a thousand for each `seed`, then those
 #: held out.
@@ -173,7 +174,8 @@ def _task(
         )
     known = read_environment(environment or "course-keeping")
     of_sea = {} if sea is None else {"sea": sea}
-    keywords = {**known.options, **of_sea, **options}
+    of_file = file_options(known.name)
+    keywords = {**of_file, **known.options, **of_sea, **options}
     ship = keywords.pop("model", "mariner")
     return BenchmarkTask("", known.name, model or ship, options=keywords)
 

@@ -152,6 +152,9 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
             if not self.curve or self.curve[-1]["steps"] != self.steps:
                 self.evaluate()
             self.save()
+        except KeyboardInterrupt:
+            self.save()
+            raise
         except ValueError as error:
             # torch refuses to draw from a distribution that is not one
             if "invalid values" not in str(error):

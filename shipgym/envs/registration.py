@@ -7,7 +7,7 @@ import gymnasium
 
 from shipgym.checks import check_text
 from shipgym.errors import InputError
-from shipgym.python_files import load_file
+from shipgym.python_files import file_options
 
 ENTRY_POINT = "shipgym.envs.ship_env:ShipEnv"  # of every environment
 #: Waves of sea states 4 and 5 from abeam to the quarter, by height and period.
@@ -119,11 +119,13 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
         The file of the task (`shipgym.tasks.contract`). Give its path, and worker
         processes find it too.
     **options
-        Keywords of the environment that differ from their defaults.
+        Keywords of the environment that differ from their defaults, and from those
+        that the file names in `OPTIONS`.
     """
     from shipgym.engine.source import kept_source
     from shipgym.envs.ship_env import ShipEnv
 
+    options = file_options(task) | options
     given = {"task": kept_source(task), **options}
     for name in given.keys() & {"reward", "sensors", "sea"}:
         given[name] = kept_source(options[name])
@@ -145,9 +147,8 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
 
 
 def register_file(env_id: str, path: Path) -> None:
-    """Register a task whose file names its keywords in `OPTIONS`, untried."""
-    options = vars(load_file(path))["OPTIONS"]
-    _register(env_id, {"task": str(path), **options})
+    """Register a task of a file, untried."""
+    _register(env_id, {"task": str(path), **file_options(path)})
 
 
 def registered() -> dict[str, dict[str, Any]]:

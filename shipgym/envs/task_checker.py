@@ -22,7 +22,8 @@ from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
 from shipgym.findings import Findings
 from shipgym.models import ShipModel
-from shipgym.python_files import asked, place_of
+from shipgym.python_files import asked, file_options, place_of
+from shipgym.tasks.definition import no_worst_cost
 from shipgym.tasks.task import Task
 
 STEPS = 400  # in plain Python, at most
@@ -54,8 +55,9 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
     package's; options are keywords of the environment, `model`, `reward` and `sensors`
     among them.
     """
-    ship = options.pop("model", DEFAULT_MODEL)
     try:
+        options = file_options(task) | options
+        ship = options.pop("model", DEFAULT_MODEL)
         model, given, randomisation = read_options(task, ship, options)
         return _checked(model, given, randomisation)
     except InputError as error:
@@ -98,6 +100,7 @@ def _checked(model: ShipModel, given: Task, randomisation: Randomisation) -> Tas
     remarks = list(_printed(many))
     positive = list(_positive(many, sailed))
     remarks += positive or _rare(sailed)
+    remarks += _free_losses(given, sailed)
     return TaskCheck(given.name, tuple(sailed.faults.values()), tuple(remarks))
 
 
@@ -172,6 +175,7 @@ class _Sailed(NamedTuple):
     rewards: Floats  # shape (n_steps,)
     parts: Floats  # before they are bounded, shape (n_steps, n_parts)
     faults: dict[str, str]  # of numbers that are not finite
+    ended: bool  # whether an episode ended before its time
 
 
 def _sailed(engine: Engine) -> _Sailed:
@@ -179,6 +183,7 @@ def _sailed(engine: Engine) -> _Sailed:
     random = np.random.default_rng(0)
     sailing = np.ones(MANY, dtype=np.bool_)
     earned, parts = [], []
+    ended = False
     faults: dict[str, str] = {}
     _note_faults(faults, engine, 0)
     for step in range(engine.task.episode_steps):
@@ -188,10 +193,21 @@ def _sailed(engine: Engine) -> _Sailed:
         _note_faults(faults, engine, step + 1)
         earned.append(rewards[sailing])
         parts.append(engine.reward_parts[sailing])
+        ended |= bool((sailing & terminated).any())
         sailing &= ~(terminated | truncated)
         if not sailing.any():
             break
-    return _Sailed(np.concatenate(earned), np.concatenate(parts), faults)
+    return _Sailed(np.concatenate(earned), np.concatenate(parts), faults, ended)
+
+
+def _free_losses(task: Task, sailed: _Sailed) -> Iterator[str]:
+    """Remark on lost ships that cost nothing more."""
+    if sailed.ended and task.definition.worst_cost is no_worst_cost:
+        yield (
+            f"{task.definition.source}: an episode ended before its time, and a lost"
+            " ship costs nothing more: the sooner lost, the cheaper; write"
+            " worst_cost(settings), the largest cost of a step"
+        )
 
 
 def _positive(engine: Engine, sailed: _Sailed) -> Iterator[str]:

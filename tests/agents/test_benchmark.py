@@ -354,6 +354,15 @@ def own(tmp_path, monkeypatch):
     gymnasium.registry.update(registered)
 
 
+def test_a_task_in_which_losing_pays_is_not_ranked(own):
+    text = FAIRWAY.read_text().replace("def worst_cost(", "def not_it(")
+    (own / "fairway.py").write_text(text)
+    words = ["--suite", "own.toml", "--controllers", "lq", "--allow-code"]
+    answer = shipgym(*words, "--tasks", "fairway", "--out", "out")
+    assert answer.exit_code == 2
+    assert "fairway: expected worst_cost(settings) in " in answer.stderr
+
+
 def test_a_suite_of_ones_own_is_run_as_a_shipped_one(own):
     words = ["--suite", "own.toml", "--controllers", "helm=my_helm:make,lq"]
     words += ["--episodes", 2, "--workers", 2, "--out", "out"]

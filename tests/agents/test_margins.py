@@ -32,8 +32,8 @@ def pole(controller, ship, place, factor=1.0, delay=0):
     loop = controller.loop()
     columns = np.where(signals_at(place), factor, 1.0)
     order = factor if place == "order" else 1.0
-    changed = replace(
-        loop, B=loop.B * columns, C=order * loop.C, D=order * loop.D * columns
+    changed = loop._replace(
+        B=loop.B * columns, C=order * loop.C, D=order * loop.D * columns
     )
     if place != "order" or not delay:
         return largest_pole(changed.closed_loop(ship))

@@ -1,6 +1,7 @@
 """Training: what is learned, evaluated, kept and resumed."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from agents.training.algorithms import make_agent, make_ships
 from agents.training.plan import EVALUATION_SEED, make_plan
 from shipgym.errors import InputError
 
+FAIRWAY = Path(__file__).parents[2] / "examples" / "fairway.py"
 TINY = {
     "ppo": {
         "base": "none",
@@ -230,3 +232,19 @@ def test_wrong_input_is_one_message_and_nothing_written(words, expected, tmp_pat
     assert code == 2
     assert expected in printed
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupted_training_goes_on_from_the_step_it_reached(tmp_path):
+    def interrupt(now):
+        if now.steps >= 64:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(tiny(), tmp_path / "run", on_progress=interrupt)
+    result = train(tiny(), tmp_path / "run", resume=True)
+    assert result.resumed_from >= 64
+
+
+def test_the_file_of_a_task_names_the_ship_and_the_action_that_are_learned():
+    plan = make_plan("ppo", str(FAIRWAY))
+    assert (plan.task.ship.name, plan.task.task.action) == ("kvlcc2", "rudder-shaft")

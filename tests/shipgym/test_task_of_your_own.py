@@ -469,7 +469,7 @@ def test_bounds_of_an_observation_are_finite_and_in_order(tmp_path):
             "scale: expected a function of ship and settings, got one of arguments ship"
         ),
         "-1.0, 1.0, scale=lambda ship, _: 0.0": (
-            "scale for 'mariner-tls-svm': expected a number > 0, got 0"
+            "scale for 'kvlcc2': expected a number > 0, got 0"
         ),
         "-1.0, 1.0, scale=lambda ship, _: ship.w": (
             "AttributeError: 'Ship' object has no attribute 'w'"
@@ -483,3 +483,12 @@ def test_bounds_of_an_observation_are_finite_and_in_order(tmp_path):
         (problem,) = check_task(path).problems
         assert problem.startswith(str(path)), problem
         assert wrong in problem, problem
+
+
+def test_a_lost_ship_that_costs_nothing_more_is_remarked_on(tmp_path):
+    name = "def worst_cost(settings):"
+    free = FAIRWAY.replace(name, "def not_it(settings):")
+    found = check_task(written(tmp_path, "fairway.py", free))
+    assert any("the sooner lost, the cheaper" in remark for remark in found.remarks)
+    with_it = check_task(written(tmp_path, "with_it.py", FAIRWAY))
+    assert not any("the sooner" in remark for remark in with_it.remarks)
