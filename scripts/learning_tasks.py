@@ -25,9 +25,7 @@ from agents.training.controller_search import SearchBudget, search
 from agents.training.controller_space import factor
 from agents.training.residual import ResidualVecEnv
 from shipgym.arrays import Floats
-from shipgym.envs.registration import register_file
 from shipgym.envs.sb3 import ShipVecEnv
-from shipgym.examples import FOLDER
 
 JUDGED, SEARCHED = 1_000_000, 500_000  # first seeds
 EPISODES = 100
@@ -104,8 +102,8 @@ TASKS = {
     "rudder-roll": Task("shipgym/RudderRoll-v0", RollDamping),
     "encounter": Task("shipgym/Encounter-v0", Scenarios),
     "unknown-ship": Task("shipgym/UnknownShip-v0", PD),
-    "berth": Task("examples/Berth-v0", Berth),
-    "river": Task("examples/River-v0", River),
+    "berth": Task("shipgym.examples:examples/Berth-v0", Berth),
+    "river": Task("shipgym.examples:examples/River-v0", River),
 }
 
 
@@ -130,8 +128,6 @@ def main() -> None:
     given = parser.parse_args()
     torch.set_num_threads(1)
     task = TASKS[given.task]
-    if task.env.startswith("examples/"):
-        register_file(task.env, FOLDER / f"{given.task}.py")
     ships = ships_of(task, EPISODES, JUDGED)
     rule = rule_of(task, ships)
     print("| | cost | beyond | success |\n| --- | ---: | ---: | ---: |")

@@ -73,13 +73,12 @@ def check_keys(
     where: str,
     required: Iterable[str] = (),
 ) -> None:
-    """Refuse an unknown key, naming the nearest, and a missing required one."""
+    """Refuse an unknown key, naming the nearest or all, and a missing required one."""
     for key in mapping:
         if key not in allowed:
             near = did_you_mean(key, allowed)
-            is_told = near and len(allowed) > 20
-            known = "" if is_told else f" Known keys: {quoted(allowed)}"
-            raise InputError(f"{where}: unknown key '{key}'.{near}{known}")
+            known = near or f" Known keys: {quoted(allowed)}"
+            raise InputError(f"{where}: unknown key '{key}'.{known}")
     for key in required:
         if key not in mapping:
             raise InputError(
@@ -269,8 +268,7 @@ def check_finite(values: Any, where: str, hint: str = "") -> NDArray[np.float64]
     wrong = np.argwhere(~np.isfinite(array))
     if len(wrong):
         place = tuple(wrong[0].tolist())
-        sample = ", ".join(map(str, place))
-        where_in_it = f" at sample {sample}" if place else ""
+        where_in_it = f" at sample {', '.join(map(str, place))}" if place else ""
         remedy = f"; {hint}" if hint else ""
         raise InputError(
             f"{where}: expected finite numbers, got {array[place]}{where_in_it}{remedy}"

@@ -144,7 +144,7 @@ def piece_errors(
 
 def share_that_runs_away(model: ShipModel) -> float:
     """Share of the ships drawn from a model that run away in a hard turn."""
-    if model.covariance is None and model.draws is None:
+    if model.covariance is None:
         return 0.0
     draws = model.sample(40, 0)
     lost = 0

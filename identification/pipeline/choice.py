@@ -111,14 +111,13 @@ def select(trials: Sequence[Trial], options: Options) -> Choice:
         attempts.add(tables[0].structure, Refinement())
 
     ranked = attempts.by_rank()
-    passed_over = dict[str, float]()
-    best = attempts.usable(ranked, passed_over)
+    best = attempts.usable(ranked)
     others = [other for other in ranked if other is not best]
     report = {
         "held_out": held_out,
         "ranking": [one.plain() for one in (best, *others)],
         "refused": attempts.refused,
-        "passed_over": passed_over,
+        "passed_over": attempts.passed_over,
     }
     own, whole = attempts.fits[fit_name(best.structure, best.method)]
     if single:
@@ -157,6 +156,8 @@ class _Attempts:
     ranked: list[RankedFit] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)  # why, by name
     fits: dict[str, tuple[Options, Any]] = field(default_factory=dict)  # by name
+    #: share of the draws that run away, by name
+    passed_over: dict[str, float] = field(default_factory=dict)
 
     def add(self, structure: str, method: Any) -> None:
         """Try a structure and a method, or remember why it cannot be fitted."""
@@ -180,13 +181,8 @@ class _Attempts:
         else:
             self.fits[name] = own, found
 
-    def usable(
-        self, ranked: Sequence[RankedFit], passed_over: dict[str, float]
-    ) -> RankedFit:
-        """The simplest of the best whose draws are ships; if none has, of all.
-
-        `passed_over` gets the others by name, and the share of draws that run away.
-        """
+    def usable(self, ranked: Sequence[RankedFit]) -> RankedFit:
+        """The simplest of the best whose draws are ships; if none has, of all."""
         left = [*ranked]
         while left:
             best = simplest(left)
@@ -195,9 +191,9 @@ class _Attempts:
             share = share_that_runs_away(whole.result(own).model)
             if share < MOST_THAT_RUN_AWAY:
                 return best
-            passed_over[name] = share
+            self.passed_over[name] = share
             left.remove(best)
-        passed_over.clear()
+        self.passed_over.clear()
         return simplest(ranked)
 
     def by_rank(self) -> list[RankedFit]:

@@ -93,7 +93,7 @@ def check_steps(t: Floats, locator: Locator) -> list[str]:
     if 0.005 <= step <= 10.0:
         steps = np.diff(t)
         widest = int(np.argmax(steps))
-        hole = float(steps[widest])
+        hole = steps[widest]
         if hole <= max(10.0 * step, 5.0):
             return []
         start = t[widest] - t[0]
