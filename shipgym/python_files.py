@@ -13,6 +13,7 @@ from traceback import extract_tb
 from types import CodeType, FrameType, FunctionType, ModuleType
 from typing import Any
 
+from shipgym.checks import check_table
 from shipgym.errors import InputError
 
 #: Where code is that is not a user's own.
@@ -178,4 +179,5 @@ def file_options(task: Any) -> dict[str, Any]:
     """Keywords that the file of a task names in `OPTIONS`; none for another task."""
     if not str(task).endswith(".py"):
         return {}
-    return dict(vars(load_file(Path(task))).get("OPTIONS", {}))
+    named = vars(load_file(Path(task))).get("OPTIONS", {})
+    return dict(check_table(named, f"{task}: OPTIONS"))

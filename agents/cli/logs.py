@@ -291,8 +291,7 @@ def look_command(
         for channel, words in reading.items():
             say(f"  {channel}: {words}")
         for note in trial.notes:
-            is_named = note.startswith(trial.name)
-            warn(note if is_named else f"{trial.name}: {note}")
+            warn(f"{trial.name}: {note.removeprefix(f'{trial.name}: ')}")
     for remark in remarks:
         warn(remark)
     found = {"written": str(out), "verdict": headline, "trials": fields}

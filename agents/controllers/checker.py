@@ -3,6 +3,7 @@
 It checks what rollouts, the benchmark and the tools of stable-baselines3 rely on.
 """
 
+import inspect
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,10 +56,24 @@ def check_controller(
     ship = ship_of("mariner" if model is None else model)
     asked = task or course_keeping_task()
     name = type(controller).__name__
-    if not callable(getattr(controller, "predict", None)):
-        raise InputError(f"{name}: expected a method predict, got none")
+    check_signature(controller, name)
     check_observations(controller, ship, asked, name)
     check_episode(_Asking(controller, f"{name}.predict"), ship, asked, n_steps)
+
+
+def check_signature(controller: Any, name: str) -> None:
+    """Refuse a controller without `predict`, or with one of other arguments."""
+    predict = getattr(controller, "predict", None)
+    if not callable(predict):
+        raise InputError(f"{name}: expected a method predict, got none")
+    signature = inspect.signature(predict)
+    try:
+        signature.bind(None, state=None, episode_start=None, deterministic=True)
+    except TypeError as error:
+        raise InputError(
+            f"{name}.predict: expected predict(observation, state=None,"
+            f" episode_start=None, deterministic=True), got {signature}: {error}"
+        ) from None
 
 
 def check_observations(

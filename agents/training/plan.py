@@ -175,6 +175,8 @@ def _task(
     known = read_environment(environment or "course-keeping")
     of_sea = {} if sea is None else {"sea": sea}
     of_file = file_options(known.name)
+    for name in PACE:  # settings of learning
+        of_file.pop(name, None)
     keywords = {**of_file, **known.options, **of_sea, **options}
     ship = keywords.pop("model", "mariner")
     return BenchmarkTask("", known.name, model or ship, options=keywords)

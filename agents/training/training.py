@@ -220,11 +220,19 @@ class _Run(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type
         if is_best:
             self.policy = policy
         if self.folder is not None:
-            policy.save(self.folder / run_folder.LAST)
-            if is_best:
-                policy.save(self.folder / run_folder.AGENT)
-            progress = {"yardsticks": self.held_out.costs, "curve": self.curve}
-            write_json(progress, self.folder / run_folder.PROGRESS)
+            try:
+                self._write(self.folder, policy, is_best)
+            except KeyboardInterrupt:  # as if it had not been evaluated
+                self.curve.pop()
+                raise
+
+    def _write(self, folder: Path, policy: LearnedPolicy, is_best: bool) -> None:
+        """Write a policy, the best one too, and the learning curve."""
+        policy.save(folder / run_folder.LAST)
+        if is_best:
+            policy.save(folder / run_folder.AGENT)
+        progress = {"yardsticks": self.held_out.costs, "curve": self.curve}
+        write_json(progress, folder / run_folder.PROGRESS)
 
     def _diverged(self) -> InputError:
         return InputError(

@@ -65,7 +65,7 @@ def refused_designs(found: Verification, fit: Fit) -> Refusals:
             lost[pilot.key] = why
     tracks = {}
     for track in found.tracks:
-        why = lost_track(track)
+        why = lost_track(track) or lacking_margin(track.controller)
         if why is not None:
             tracks[track.key] = why
     refused = lost | tracks

@@ -125,10 +125,9 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     from shipgym.engine.source import kept_source
     from shipgym.envs.ship_env import ShipEnv
 
-    options = file_options(task) | options
-    given = {"task": kept_source(task), **options}
+    given = {**file_options(task), **options, "task": kept_source(task)}
     for name in given.keys() & {"reward", "sensors", "sea"}:
-        given[name] = kept_source(options[name])
+        given[name] = kept_source(given[name])
     known = gymnasium.registry.get(check_text(env_id, "env_id"))
     if known is not None and known.kwargs != given:
         raise InputError(

@@ -16,7 +16,7 @@ from shipgym.engine.episode_program import EpisodeProgram
 from shipgym.engine.fingerprint import fingerprint
 from shipgym.engine.specialise import loaded_names
 from shipgym.envs.engine import Engine
-from shipgym.envs.environment import DEFAULT_MODEL, read_options
+from shipgym.envs.environment import DEFAULT_MODEL, PACE, read_options
 from shipgym.envs.plain_python import plain_loop
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
@@ -57,6 +57,8 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
     """
     try:
         options = file_options(task) | options
+        for name in PACE:
+            options.pop(name, None)
         ship = options.pop("model", DEFAULT_MODEL)
         model, given, randomisation = read_options(task, ship, options)
         return _checked(model, given, randomisation)
@@ -175,7 +177,6 @@ class _Sailed(NamedTuple):
     rewards: Floats  # shape (n_steps,)
     parts: Floats  # before they are bounded, shape (n_steps, n_parts)
     faults: dict[str, str]  # of numbers that are not finite
-    ended: bool  # whether an episode ended before its time
 
 
 def _sailed(engine: Engine) -> _Sailed:
@@ -183,7 +184,6 @@ def _sailed(engine: Engine) -> _Sailed:
     random = np.random.default_rng(0)
     sailing = np.ones(MANY, dtype=np.bool_)
     earned, parts = [], []
-    ended = False
     faults: dict[str, str] = {}
     _note_faults(faults, engine, 0)
     for step in range(engine.task.episode_steps):
@@ -193,16 +193,16 @@ def _sailed(engine: Engine) -> _Sailed:
         _note_faults(faults, engine, step + 1)
         earned.append(rewards[sailing])
         parts.append(engine.reward_parts[sailing])
-        ended |= bool((sailing & terminated).any())
         sailing &= ~(terminated | truncated)
         if not sailing.any():
             break
-    return _Sailed(np.concatenate(earned), np.concatenate(parts), faults, ended)
+    return _Sailed(np.concatenate(earned), np.concatenate(parts), faults)
 
 
 def _free_losses(task: Task, sailed: _Sailed) -> Iterator[str]:
     """Remark on lost ships that cost nothing more."""
-    if sailed.ended and task.definition.worst_cost is no_worst_cost:
+    is_early = sailed.rewards.size < MANY * task.episode_steps
+    if is_early and task.definition.worst_cost is no_worst_cost:
         yield (
             f"{task.definition.source}: an episode ended before its time, and a lost"
             " ship costs nothing more: the sooner lost, the cheaper; write"

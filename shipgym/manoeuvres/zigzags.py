@@ -185,7 +185,7 @@ def switch_heading_deg(trial: Trial) -> float | None:
     before, at = sorted(changes_deg.tolist())
     usual = [1.0, *range(5, 95, 5)]
     if is_ordered(trial):
-        slack = 1e-6 + 3.0 * course_error_deg(trial)
+        slack = 1e-6 + min(3.0 * course_error_deg(trial), 2.0)
         whole = float(np.floor(at + 1e-6))
         for angle in (*reversed(usual), whole):
             if before - slack <= angle <= at + slack:

@@ -57,9 +57,9 @@ def verdict(trials: Sequence[Trial], to_decide: Sequence[str]) -> tuple[str, str
     if not channels & {"psi", "r"}:
         return "Nothing can be identified from this: there is no heading.", "bad"
     notes = sum(len(trial.notes) for trial in trials)
-    found = counted(notes, "warning") if notes else "no warning"
+    found = counted(len(trials), "trial")
     return (
-        f"{counted(len(trials), 'trial')} to identify a model from, with {found}.",
+        f"{found} to identify a model from, with {counted(notes, 'warning')}.",
         "warn" if notes else "good",
     )
 

@@ -80,8 +80,8 @@ def _to_midship(
     """Move GNSS positions and velocities to midship and derive surge and sway.
 
     Velocity over ground gives u and v, else positions; a speed through the water takes
-    the place of u, and the current that it shows is taken out of v, x and y. Raises
-    InputError for GNSS without a heading.
+    the place of u, and the current that it shows is taken out of v and, on courses that
+    differ enough to tell it, of x and y. Raises InputError for GNSS without a heading.
     """
     channels = log.channels
     is_moved = log.has("x", "y") and not installation.is_at_midship
@@ -105,14 +105,7 @@ def _to_midship(
         return
     u, v = velocity
     if water is not None and not log.magnetic:
-        north, east = _current_by_log(log, water, u, v)
-        # leeway is what is left of the sway without the current
-        _, across = rotate_to_body(north, east, channels["psi"])
-        v = v - across
-        time = log.t - log.t[0]
-        for name, speed in (("x", north), ("y", east)):
-            if log.has(name):
-                channels[name] = channels[name] - speed * time
+        v = _through_water(log, water, u, v)
     for name, values in (("u", u), ("v", v)):
         if not log.has(name):
             log.derive(name, values)
@@ -134,21 +127,20 @@ def _velocity(log: Log, installation: Installation) -> tuple[Floats, Floats] | N
     return u, v
 
 
-def _current_by_log(
-    log: Log, water: Floats, u: Floats, v: Floats
-) -> tuple[float, float]:
-    """Current that a speed log shows, north and east, m/s; adds a note of it.
+def _through_water(log: Log, water: Floats, u: Floats, v: Floats) -> Floats:
+    """Sway over ground less the current that a speed log shows; adds a note of it.
 
     The current explains best the difference of both speeds along the ship; on nearly
-    one course the part across is taken from the mean sway, as if there were no leeway.
+    one course the part across is taken from the mean sway, as if there were no leeway,
+    else it is taken out of the track too.
     """
     psi = log.channels["psi"]
     c = np.cos(psi)
     s = np.sin(psi)
     rows = np.column_stack([c, s])
     values = u - water
-    distinct_courses = math.radians(60.0)
-    if np.ptp(psi) < distinct_courses:
+    is_known = np.ptp(psi) >= math.radians(60.0)
+    if not is_known:
         across = np.column_stack([-s, c])
         rows = np.vstack([rows, across])
         values = np.concatenate([values, v])
@@ -159,6 +151,12 @@ def _current_by_log(
     log.notes.append(
         "set and drift by the speed log against the ground:"
         f" {set_and_drift(north, east)}, {unexplained:.2f} m/s unexplained; removed"
-        " from the sway and the track"
+        f" from the sway{' and the track' if is_known else ''}"
     )
-    return north, east
+    if is_known:
+        for name, speed in (("x", north), ("y", east)):
+            if log.has(name):
+                drifted = speed * (log.t - log.t[0])
+                log.channels[name] = log.channels[name] - drifted
+    _, sway = rotate_to_body(north, east, psi)
+    return np.asarray(v - sway)

@@ -138,3 +138,12 @@ def test_a_user_s_own_passes():
 def test_a_broken_promise_is_named(controller, message):
     with pytest.raises(InputError, match=message):
         check_controller(controller, MARINER)
+
+
+def test_a_predict_of_other_arguments_is_named():
+    class Own:
+        def predict(self, observation):
+            return observation, None
+
+    with pytest.raises(InputError, match=r"Own.predict: expected predict\(observation"):
+        check_controller(Own())

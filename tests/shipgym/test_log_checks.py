@@ -57,10 +57,6 @@ def at(values, row, value):
         ({"psi": SWING, "r": RATE / 5.3}, "changes 5.3 times as fast as the yaw rate"),
         ({"psi": TURN, "x": X, "y": Y, "u": U / 0.514, "v": V}, 'unit = "knots" }'),
         (
-            {"psi": SWING, "x": Y, "y": X, "sog": U, "cog": TURN},
-            "got north and east exchanged; exchange the columns of latitude",
-        ),
-        (
             {"psi": TURN, "x": X, "y": Y, "stw": U / 0.514},
             "0.514 times as much over ground, which no current does; likely a wrong"
             ' unit, declare stw = { column = "stw", unit = "knots" }',

@@ -174,8 +174,6 @@ def check_over_ground(log: Log, conventions: Conventions, locator: Locator) -> N
     The channels are as logged, in SI units, the heading without jumps.
     """
     north, east = log.ground_velocity
-    if log.has("x", "y", "ground_north"):
-        _check_exchanged(log, north + 1j * east, locator)
     speed = np.hypot(north, east)
     fastest = np.quantile(speed, 0.95)
     if fastest < _SLOWEST:
@@ -201,25 +199,6 @@ def check_over_ground(log: Log, conventions: Conventions, locator: Locator) -> N
     fault = _heading_fault(psi, course, offset_is_known=is_known)
     if fault:
         raise InputError(f"{locator.path}: expected a heading {fault}")
-
-
-def _check_exchanged(
-    log: Log, velocity: npt.NDArray[np.complex128], locator: Locator
-) -> None:
-    """Refuse positions of which only the exchanged ones follow the velocity."""
-    position = log.channels["x"] + 1j * log.channels["y"]
-    sailed = integral(log.t, velocity)
-    _, moved, expected = changes(log.t, 10.0, position, sailed)
-    exchanged = 1j * np.conj(moved)
-    distance = np.linalg.norm(expected)
-    is_off = np.linalg.norm(moved - expected) > 0.7 * distance
-    # longitudes taken for latitudes are up to twice as long
-    if is_off and np.linalg.norm(exchanged - expected) < 0.5 * distance:
-        raise InputError(
-            f"{locator.path}: expected positions that follow the course over ground,"
-            " got north and east exchanged; exchange the columns of latitude and"
-            " longitude, or of x and y"
-        )
 
 
 def check_speed_units(log: Log, locator: Locator) -> None:
