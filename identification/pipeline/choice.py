@@ -77,6 +77,7 @@ class Choice(NamedTuple):
     options: Options
     fit: Any  # of all trials
     report: dict[str, Any]  # the ranking, for the provenance
+    result: IdentificationResult | None = None  # where it is known already
 
 
 def select(trials: Sequence[Trial], options: Options) -> Choice:
@@ -119,10 +120,11 @@ def select(trials: Sequence[Trial], options: Options) -> Choice:
         "refused": attempts.refused,
         "passed_over": attempts.passed_over,
     }
-    own, whole = attempts.fits[fit_name(best.structure, best.method)]
+    name = fit_name(best.structure, best.method)
+    own, whole = attempts.fits[name]
+    found = Choice(own, whole, report, attempts.results.get(name))
     if single:
-        whole = fitted(trials, own)
-    found = Choice(own, whole, report)
+        found = Choice(own, fitted(trials, own), report)
     if options.rudder_bias == "none" or best.structure == MMG:
         return found
     return _with_bias(found, trials)
@@ -137,7 +139,8 @@ def _with_bias(choice: Choice, trials: Sequence[Trial]) -> Choice:
     options, report = choice.options, choice.report
     biased = f"{name_of(options.structure)}-bias"
     if biased not in RESPONSES or not isinstance(options.method, Refinement):
-        return Choice(*with_rudder_bias(choice.fit, options), report)
+        own, fit = with_rudder_bias(choice.fit, options)
+        return choice if fit is choice.fit else Choice(own, fit, report)
     asked = replace(options, structure=biased)
     other = fitted(trials, asked)
     bias = other.result(asked).metrics.get("rudder_bias")
@@ -156,6 +159,7 @@ class _Attempts:
     ranked: list[RankedFit] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)  # why, by name
     fits: dict[str, tuple[Options, Any]] = field(default_factory=dict)  # by name
+    results: dict[str, IdentificationResult] = field(default_factory=dict)
     #: share of the draws that run away, by name
     passed_over: dict[str, float] = field(default_factory=dict)
 
@@ -188,7 +192,8 @@ class _Attempts:
             best = simplest(left)
             name = fit_name(best.structure, best.method)
             own, whole = self.fits[name]
-            share = share_that_runs_away(whole.result(own).model)
+            self.results[name] = whole.result(own)
+            share = share_that_runs_away(self.results[name].model)
             if share < MOST_THAT_RUN_AWAY:
                 return best
             self.passed_over[name] = share
@@ -228,7 +233,7 @@ def identified(trials: Sequence[Trial], options: Options) -> IdentificationResul
 def by_selection(trials: Sequence[Trial], options: Options) -> IdentificationResult:
     """By the structure and method that predict trials to fit best, each held out."""
     choice = select(trials, options)
-    best: IdentificationResult = choice.fit.result(choice.options)
+    best: IdentificationResult = choice.result or choice.fit.result(choice.options)
     selection = {"selection": choice.report}
     return replace(
         with_provenance(best, selection),
