@@ -29,8 +29,6 @@ from shipgym.errors import InputError
 from shipgym.extras import library
 from shipgym.python_files import working_folder
 
-__all__ = ["HERE", "JobEngine", "JobError", "run_jobs"]
-
 #: A job and its result as JSON, in the order in which jobs finish.
 Finished = Iterator[tuple[str, str]]
 

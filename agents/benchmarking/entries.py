@@ -45,8 +45,9 @@ from agents.controllers.registry import (
     register_controller,
 )
 from agents.controllers.task_rule import TaskRule
+from agents.suites.benchmark_task import BenchmarkTask
 from agents.suites.environments import import_named
-from agents.suites.suite import BenchmarkTask, tuned_file
+from agents.suites.suite import tuned_file
 from shipgym import load_model
 from shipgym.checks import did_you_mean, quoted
 from shipgym.envs.engine import Engine

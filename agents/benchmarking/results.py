@@ -20,7 +20,8 @@ from agents.benchmarking.entries import Entry, file_hash
 from agents.benchmarking.summary import Summary
 from agents.controllers.interface import model_hash
 from agents.output import check_results, versions
-from agents.suites.suite import BenchmarkTask, Suite
+from agents.suites.benchmark_task import BenchmarkTask
+from agents.suites.suite import Suite
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_format
 from shipgym.drafts import atomic_path

@@ -12,12 +12,8 @@ from agents.benchmarking.entries import Entry, read_entries, source_for
 from agents.benchmarking.results import PARTS, BenchmarkResult, check_new, collect
 from agents.jobs import JobEngine, run_jobs
 from agents.output import in_use
-from agents.suites.suite import (
-    DEFAULT_SUITE,
-    N_EPISODES,
-    BenchmarkTask,
-    load_suite,
-)
+from agents.suites.benchmark_task import N_EPISODES, BenchmarkTask
+from agents.suites.suite import DEFAULT_SUITE, load_suite
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
 from shipgym.tasks.definition import no_worst_cost

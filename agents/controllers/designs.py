@@ -6,7 +6,8 @@ from typing import Any
 from agents.controllers.controller import Controller
 from agents.controllers.law import linear_law
 from agents.controllers.registry import controller_class
-from agents.suites.suite import BenchmarkTask, load_tuned
+from agents.suites.benchmark_task import BenchmarkTask
+from agents.suites.suite import load_tuned
 from shipgym import InputError
 from shipgym.checks import quoted
 from shipgym.tasks.task import Task

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from agents.controllers.interface import Policy
 from agents.rollouts.rollout import Rollout, rollout
-from agents.suites.suite import BenchmarkTask
+from agents.suites.benchmark_task import BenchmarkTask
 from shipgym.arrays import Flags, Floats
 from shipgym.engine.lane_records import CONSTRAINT
 from shipgym.python_files import asked

@@ -12,8 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from agents.suites.benchmark_task import (
-    FIRST_SEED,
-    N_EPISODES,
     BenchmarkTask,
 )
 from agents.suites.environments import read_environment
@@ -29,19 +27,6 @@ from shipgym.checks import (
     placed,
 )
 from shipgym.files import LARGEST_TOML, parse_toml, read_json, read_text
-
-__all__ = [
-    "DEFAULT_SUITE",
-    "FIRST_SEED",
-    "N_EPISODES",
-    "BenchmarkTask",
-    "Suite",
-    "find_task",
-    "load_suite",
-    "load_tuned",
-    "parse_suite",
-    "tuned_file",
-]
 
 DEFAULT_SUITE = "shipgym-v1"
 FOLDER = Path(__file__).parent

@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from agents.agent_file import load_agent
 from agents.controllers.controller import Controller
 from agents.controllers.designs import design, tuned
-from agents.suites.suite import BenchmarkTask
+from agents.suites.benchmark_task import BenchmarkTask
 from agents.training.plan import TrainingPlan, training_options
 from agents.training.residual import ResidualVecEnv
 from agents.training.settings import LearningSettings, PPOSettings, SACSettings

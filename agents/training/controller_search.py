@@ -23,7 +23,7 @@ import numpy as np
 from agents.controllers.controller import Controller
 from agents.controllers.designs import design
 from agents.rollouts.rollout import episode_costs
-from agents.suites.suite import BenchmarkTask
+from agents.suites.benchmark_task import BenchmarkTask
 from agents.training.controller_space import Setting, search_space
 from shipgym.arrays import Floats, Integers
 from shipgym.envs.engine import Engine

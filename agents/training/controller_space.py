@@ -10,7 +10,7 @@ import numpy as np
 from agents.controllers.designs import INNER, no_path
 from agents.controllers.lq import LQ
 from agents.controllers.registry import controller_class, controller_kinds
-from agents.suites.suite import BenchmarkTask
+from agents.suites.benchmark_task import BenchmarkTask
 from shipgym.checks import check_choice
 
 #: Settings of LQ that are searched where it leads by preview alone.

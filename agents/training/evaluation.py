@@ -9,7 +9,7 @@ import numpy as np
 from agents.controllers.interface import Policy
 from agents.policies.policy import LearnedPolicy
 from agents.rollouts.rollout import episode_costs
-from agents.suites.suite import BenchmarkTask
+from agents.suites.benchmark_task import BenchmarkTask
 from agents.training.plan import TrainingPlan
 from agents.training.yardsticks import yardsticks
 

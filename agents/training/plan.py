@@ -7,8 +7,9 @@ from typing import Any
 
 from agents.controllers.interface import model_hash
 from agents.policies.policy import OUTPUTS
+from agents.suites.benchmark_task import BenchmarkTask
 from agents.suites.environments import SHORT_NAMES, read_environment
-from agents.suites.suite import BenchmarkTask, find_task
+from agents.suites.suite import find_task
 from agents.training.settings import (
     SEEDS_EACH,
     LearningSettings,

@@ -11,7 +11,7 @@ from agents.controllers.designs import design
 from agents.controllers.interface import Policy, check_fits
 from agents.controllers.task_rule import TaskRule
 from agents.rollouts.rollout import rollout
-from agents.suites.suite import BenchmarkTask
+from agents.suites.benchmark_task import BenchmarkTask
 from shipgym.errors import InputError
 
 

@@ -10,7 +10,7 @@ from agents.rollouts.metrics import (
     succeeded,
     worst_step_cost,
 )
-from agents.suites.suite import BenchmarkTask
+from agents.suites.benchmark_task import BenchmarkTask
 
 KEEPING = BenchmarkTask(
     "keeping", "course-keeping", "mariner", options={"episode_steps": 250}

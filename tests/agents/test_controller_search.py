@@ -8,7 +8,8 @@ import pytest
 from agents import PID
 from agents.controllers.designs import design, tuned
 from agents.controllers.registry import CLASSICAL
-from agents.suites.suite import BenchmarkTask, load_suite, load_tuned
+from agents.suites.benchmark_task import BenchmarkTask
+from agents.suites.suite import load_suite, load_tuned
 from agents.training.controller_search import (
     SearchBudget,
     has_margin,

@@ -7,7 +7,7 @@ import pytest
 
 from agents import LQ, LQG, PID
 from agents.controllers.designs import design
-from agents.suites.suite import BenchmarkTask
+from agents.suites.benchmark_task import BenchmarkTask
 from identification.samples.logged_sensors import noise_and_waves
 from shipgym import Trial, manoeuvres
 from shipgym.errors import InputError

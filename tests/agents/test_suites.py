@@ -9,10 +9,9 @@ import pytest
 
 import shipgym
 from agents.controllers.interface import model_hash
-from agents.suites.benchmark_task import SETS, judging_seeds, with_terms
+from agents.suites.benchmark_task import SETS, BenchmarkTask, judging_seeds, with_terms
 from agents.suites.environments import read_environment
 from agents.suites.suite import (
-    BenchmarkTask,
     find_task,
     load_suite,
     load_tuned,
