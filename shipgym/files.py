@@ -34,16 +34,23 @@ DEEPEST = 20  # levels of lists and tables within each other
 LONGEST_KEY = 4096  # characters
 LARGEST_NUMBER = 1e100  # magnitude: products of three such numbers are still finite
 
-#: Kinds of files that users mistake for one another, and the commands that take them.
+#: Kinds of files that users mistake for one another, and the commands that take them;
+#: of a folder the first of them.
 TAKEN_BY = {
-    "log": "new-ship or look",
     "ship file": "look, identify or autopilot",
     "model file": "trials, export or train --model",
     "controller file": "export or benchmark --controllers",
     "recorded episode": "replay",
     "Python file": "benchmark --controllers as FILE:FUNCTION",
+    "file of weights": "export or benchmark --controllers by the .json beside it",
+    "log": "new-ship or look",
 }
-KIND_OF_SUFFIX = {"": "", ".toml": "ship file", ".py": "Python file"}
+KIND_OF_SUFFIX = {
+    "": "",
+    ".toml": "ship file",
+    ".py": "Python file",
+    ".safetensors": "file of weights",
+}
 #: Fields that only files of a kind have.
 KIND_OF_FIELD = {
     "coefficients": "model file",
@@ -263,8 +270,8 @@ def _found_instead(what: str, path: Path) -> str:
     kinds.pop("", None)
     if what in kinds:
         return f"a folder; give {kinds[what]}" if is_folder else ""
-    for kind, file in kinds.items():
-        given = f"a folder; give {file}" if is_folder else f"a {kind}; give it"
+    for kind in [one for one in TAKEN_BY if one in kinds]:
+        given = f"a folder; give {kinds[kind]}" if is_folder else f"a {kind}; give it"
         return f"{given} to shipgym {TAKEN_BY[kind]}"
     return ""
 

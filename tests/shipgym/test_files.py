@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shipgym import files
+from shipgym import ShipModel, files
 from shipgym.errors import InputError
 from shipgym.files import (
     named_values,
@@ -123,6 +123,23 @@ def test_toml_within_the_limits_is_read():
 )
 def test_only_regular_files_are_opened(tmp_path, name, message):
     assert message in refusal(read_json, tmp_path / name, "model file", "x")
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("", "a folder; give {}/ship.toml to shipgym look, identify or autopilot"),
+        ("a.csv", "a log; give it to shipgym new-ship or look"),
+        ("a.safetensors", "a file of weights; give it to shipgym export or benchmark"),
+    ],
+)
+def test_a_file_of_another_kind_is_named_with_the_command_for_it(
+    tmp_path, name, message
+):
+    for file in ("a.csv", "ship.toml", "a.safetensors"):
+        (tmp_path / file).write_text("")
+    message = f"expected a model file, got {message.format(tmp_path)}"
+    assert message in refusal(ShipModel.load, tmp_path / name)
 
 
 def test_a_file_larger_than_its_kind_may_be_is_not_read(tmp_path):
