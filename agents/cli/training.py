@@ -30,7 +30,12 @@ def learning_options(
     ] = None,
     model: Annotated[
         str | None,
-        Option(help="A model file, or the name of a shipped model; default: mariner."),
+        Option(
+            help=(
+                "A model file, or the name of a shipped model; default: that of the"
+                " environment."
+            )
+        ),
     ] = None,
     sea: Annotated[
         str | None, Option(help="calm (default), slight, moderate or rough.")

@@ -18,7 +18,8 @@ class HeldOut:
     """Episodes of a task that are not learned from, with seeds from `first` on.
 
     `costs` has the mean cost of each yardstick by its name. Among them is LQ designed
-    on the task's ship, which follows paths by the course that the task shows.
+    on the task's ship, which follows paths by the course that the task shows, and LQ
+    with preview, the best design of the suite on paths.
     """
 
     def __init__(self, task: BenchmarkTask, first: int, number: int) -> None:

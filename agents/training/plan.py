@@ -19,8 +19,9 @@ from agents.training.settings import (
 )
 from agents.training.yardsticks import half_reward_cost
 from shipgym.checks import check_choice, check_whole
-from shipgym.envs.environment import PACE
+from shipgym.envs.environment import DEFAULT_MODEL, DEFAULT_TASK, PACE
 from shipgym.envs.episode import as_json
+from shipgym.envs.registration import env_id, registered
 from shipgym.errors import InputError
 from shipgym.python_files import file_options
 
@@ -118,7 +119,7 @@ def make_plan(
     environment : str, optional
         As `read_environment` takes it; by default course keeping.
     model : str, optional
-        Name or file of a model; by default the Mariner.
+        Name or file of a model; by default that of the environment.
     sea : str, optional
         Sea state.
     task : str, optional
@@ -178,8 +179,10 @@ def _task(
     of_file = file_options(known.name)
     for name in PACE:  # settings of learning
         of_file.pop(name, None)
+    task = env_id(SHORT_NAMES.get(known.name, DEFAULT_TASK))
+    usual = registered()[task].get("model", DEFAULT_MODEL)
     keywords = {**of_file, **known.options, **of_sea, **options}
-    ship = keywords.pop("model", "mariner")
+    ship = keywords.pop("model", usual)
     return BenchmarkTask("", known.name, model or ship, options=keywords)
 
 

@@ -14,6 +14,9 @@ from agents.rollouts.rollout import rollout
 from agents.suites.benchmark_task import BenchmarkTask
 from shipgym.errors import InputError
 
+#: Controllers beside every agent of the rudder: those that the task has a use for.
+DESIGNED = {"lq": "LQ", "preview-lq": "LQ with preview"}
+
 
 class RandomActions:
     """Commands that are drawn anew in each control interval, evenly from [-1, 1].
@@ -40,7 +43,7 @@ def yardsticks(task: BenchmarkTask) -> Mapping[str, Policy]:
     """Policies by name that show what an agent is worth on a task.
 
     They are the action zero, random actions, the rule of the task's file where it has
-    one, and LQ where she has one for the task.
+    one, and LQ where she has one for the task, on paths with preview too.
     """
     asked = task.task
     found: dict[str, Policy] = {
@@ -49,11 +52,11 @@ def yardsticks(task: BenchmarkTask) -> Mapping[str, Policy]:
     }
     if asked.definition.rule is not None:
         found["rule"] = TaskRule(asked, task.ship)
-    if asked.action == "rudder":
+    for kind, name in DESIGNED.items() if asked.action == "rudder" else ():
         with suppress(InputError):
-            lq = design("lq", task)
-            check_fits(lq, asked, task.ship, "lq")
-            found["LQ"] = lq
+            rule = design(kind, task)
+            check_fits(rule, asked, task.ship, kind)
+            found[name] = rule
     return found
 
 

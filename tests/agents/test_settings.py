@@ -1,8 +1,10 @@
 """Settings and plans of learning: what is allowed, where a value comes from, what is
 refused."""
 
+import gymnasium
 import pytest
 
+from agents.training.evaluation import HeldOut
 from agents.training.plan import make_plan, training_options
 from agents.training.settings import (
     load_settings,
@@ -53,6 +55,26 @@ def test_a_value_comes_from_the_nearest_table():
         load_settings("ppo", "paths")
 
 
+@pytest.mark.parametrize(
+    ("name", "env_id"),
+    [
+        ("course-keeping", "shipgym/CourseKeeping-v0"),
+        ("path-following", "shipgym/PathFollowing-v0"),
+        ("encounter", "shipgym/Encounter-v0"),
+    ],
+)
+def test_a_short_name_has_the_ship_of_its_id(name, env_id):
+    env = gymnasium.make(env_id)
+    assert make_plan("ppo", name).task.model == env.unwrapped.model.name
+    assert make_plan("ppo", env_id).task.model == env.unwrapped.model.name
+
+
+def test_on_paths_an_agent_is_compared_with_lq_with_preview():
+    held_out = HeldOut(make_plan("ppo", "path-following").task, 900_000, 20)
+    costs = held_out.costs
+    assert costs["LQ with preview"] < costs["LQ"] < costs["zero action"]
+
+
 def test_the_command_goes_before_the_file_of_settings_and_that_before_tuned_ones(
     tmp_path,
 ):
@@ -94,7 +116,7 @@ SHAFT = {"action": "rudder-shaft"}
     [
         ({"seed": 800}, "seed: expected an integer of at least 0 and at most 799"),
         ({"options": {"rate_limit": 0.1}}, "--option rate_limit: expected a setting"),
-        ({"options": SHAFT}, "action: .*'mariner'"),
+        ({"options": SHAFT}, "action: .*'mariner-tls-svm'"),
         (
             {"options": SHAFT, "model": "kvlcc2", "settings": {"base": "lq"}},
             "base: expected 'none' with action 'rudder-shaft', got 'lq'",

@@ -202,7 +202,7 @@ def test_the_command_trains_and_resumes(tmp_path):
         ([], "continue with --resume"),
         (["--resume", "--set", "gamma=0.5"], "gamma: expected 0.99, got 0.5"),
         (["--resume", "--seed", "3"], "seed: expected 0, got 3"),
-        (["--resume", "--model", "kvlcc2"], "expected 'mariner', got 'kvlcc2'"),
+        (["--resume", "--model", "kvlcc2"], "expected 'mariner-tls-svm', got 'kvlcc2'"),
         (["--resume", "--sea", "slight"], "sea: expected None, got 'slight'"),
     ):
         code, printed = shipgym(*words, *more)
