@@ -278,9 +278,9 @@ class RidgeRegression(LSSVM):
         return 1.0 / self.alpha if self.alpha else np.inf
 
 
-def _main_features(direction: Floats, least_share: float = 0.1) -> tuple[int, ...]:
+def _main_features(direction: Floats) -> tuple[int, ...]:
     """Features of at least a tenth of the largest share in a direction."""
     sizes = np.abs(direction)
     shares = sizes / sizes.max()
-    main = np.flatnonzero(shares >= least_share)
+    main = np.flatnonzero(shares >= 0.1)
     return tuple(main.tolist())

@@ -262,12 +262,8 @@ class _Tuner:
         return found
 
 
-def most_regularised(
-    choices: Sequence[Choice],
-    errors: Sequence[float],
-    tolerance: float = 1.1,
-) -> Choice:
-    """The first choice whose error is nearly the least.
+def most_regularised(choices: Sequence[Choice], errors: Sequence[float]) -> Choice:
+    """The first choice whose error is at most 1.1 times the least.
 
     The first of all if none is finite.
 
@@ -277,10 +273,8 @@ def most_regularised(
         The most regularised first.
     errors : sequence of float
         Of each choice.
-    tolerance : float
-        Times the least error counts as equally good.
     """
-    allowed = tolerance * min(errors)
+    allowed = 1.1 * min(errors)
     as_good = (
         choice for choice, one in zip(choices, errors, strict=True) if one <= allowed
     )

@@ -122,9 +122,10 @@ def select(trials: Sequence[Trial], options: Options) -> Choice:
     }
     name = fit_name(best.structure, best.method)
     own, whole = attempts.fits[name]
-    found = Choice(own, whole, report, attempts.results.get(name))
+    known = attempts.results.get(name)
     if single:
-        found = Choice(own, fitted(trials, own), report)
+        whole, known = fitted(trials, own), None
+    found = Choice(own, whole, report, known)
     if options.rudder_bias == "none" or best.structure == MMG:
         return found
     return _with_bias(found, trials)

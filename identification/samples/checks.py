@@ -29,8 +29,14 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
         )
     for trial in trials:
         _check_channels(trial, structure)
-    if structure.has_rudder and all(is_still(trial) for trial in trials):
-        _refuse_still(trials[0])
+    if structure.has_rudder and all(map(is_still, trials)):
+        angle = np.degrees(np.median(trials[0]["delta"]))
+        raise InputError(
+            f"trial {trials[0].name!r}: expected a rudder that moves, got one that"
+            f" stays at {angle:.2f} deg throughout; nothing is excited and these"
+            " coefficients cannot be identified: add a trial in which the rudder moves,"
+            " such as a zigzag"
+        )
 
 
 def _check_channels(trial: Trial, structure: Structure) -> None:
@@ -66,15 +72,6 @@ def is_still(trial: Trial) -> bool:
     )
     scatter = np.degrees(6.0 * preprocess.noise_level(trial.t, delta))
     return bool(moved < max(0.5, min(scatter, 3.0)))
-
-
-def _refuse_still(trial: Trial) -> None:
-    angle = np.degrees(np.median(trial["delta"]))
-    raise InputError(
-        f"trial {trial.name!r}: expected a rudder that moves, got one that stays at"
-        f" {angle:.2f} deg throughout; nothing is excited and these coefficients cannot"
-        " be identified: add a trial in which the rudder moves, such as a zigzag"
-    )
 
 
 def check_samples(

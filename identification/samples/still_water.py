@@ -344,8 +344,10 @@ def in_still_water(
     current in columns is taken out of the track. `current` and `wind` are those of
     `Options`.
     """
-    is_usual = wind == "auto" or wind == "none"
-    if particulars is None or (is_usual and not any(map(_feels_sea, trials))):
+    is_usual = wind in ("auto", "none")
+    columns = {"wind_speed", "wind_from", *CURRENT_COLUMNS}
+    in_sea = any(one.over_ground or columns & one.channels.keys() for one in trials)
+    if particulars is None or (is_usual and not in_sea):
         return list(trials), {}
 
     ship = particulars
@@ -377,11 +379,6 @@ def in_still_water(
     if remarks:
         report["sea_remarks"] = remarks
     return [found.get(trial.name, trial) for trial in trials], report
-
-
-def _feels_sea(trial: Trial) -> bool:
-    columns = {"wind_speed", "wind_from", *CURRENT_COLUMNS}
-    return trial.over_ground or bool(columns & trial.channels.keys())
 
 
 def _starting_speed(trials: Iterable[Trial]) -> float:

@@ -11,7 +11,6 @@ import pickle
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -103,13 +102,9 @@ def locked(path: Path) -> Iterator[None]:
 
 def warn_of(folder: Path, error: BaseException) -> None:
     """Warn that nothing can be stored, and name the remedy, once in a process."""
-    _warn_once(folder, str(getattr(error, "strerror", error)))
-
-
-@cache
-def _warn_once(folder: Path, reason: str) -> None:
+    reason = getattr(error, "strerror", error)
     message = (
         f"{folder}: cannot be written ({reason}), so ships are compiled again in each"
         f" process. Set {CACHE_VARIABLE} to a folder that can."
     )
-    warnings.warn(message, CacheWarning, stacklevel=4)
+    warnings.warn(message, CacheWarning, stacklevel=1)

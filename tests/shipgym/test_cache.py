@@ -72,7 +72,7 @@ def test_a_folder_that_cannot_be_written_is_said_once(tmp_path):
     (tmp_path / "file").write_text("")
     for cache, before in ((tmp_path, full), (tmp_path / "file" / "cache", "")):
         words = said(cache, before)
-        assert words.count("CacheWarning") == words.count("cannot be written") == 1
+        assert words.count(": CacheWarning: ") == words.count("cannot be written") == 1
         assert "Set SHIPGYM_CACHE to a folder that can" in words
     assert not list(tmp_path.glob("*.loop"))
 
