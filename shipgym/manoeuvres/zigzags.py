@@ -1,6 +1,5 @@
 """Zigzags (Kempf 1932) and their indices (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -18,6 +17,7 @@ from shipgym.manoeuvres.execution import (
     reached,
     reversals,
     ship_length,
+    usual_rudder,
 )
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.models.by_name import takes_name
@@ -128,11 +128,9 @@ def zigzag_indices(
     `switch_heading_deg`. InputError for a missing channel or length.
     """
     start, turns = reversals(trial)
-    if not turns:
+    switch = heading_deg or switch_heading_deg(trial)
+    if not turns or switch is None:
         return ZigzagIndices(None, None, None, None)
-    switch = heading_deg
-    if switch is None:
-        switch = switch_heading_deg(trial)
 
     overshoots = [
         _overshoot_deg(trial, start, turn, end, switch)
@@ -148,20 +146,16 @@ def zigzag_indices(
 
 
 def _initial_turning(
-    trial: Trial, start: float, threshold_deg: float | None, length: float
+    trial: Trial, start: float, threshold_deg: float, length: float
 ) -> float | None:
     """Lengths sailed from the first order to the heading threshold, if reached."""
-    if not threshold_deg:
-        return None
-    t = trial.t
-    times = t[t >= start]
-    change = np.abs(_heading_change(trial, start, times))
-    threshold = float(np.radians(threshold_deg))
-    when = reached(change, threshold, times)
+    after = trial.t >= start
+    change_deg = np.abs(_heading_change_deg(trial, start))
+    when = reached(change_deg[after], threshold_deg, trial.t[after])
     if when is None:
         return None
     sailed = distance_sailed(trial)
-    before, then = np.interp([start, when], t, sailed)
+    before, then = np.interp([start, when], trial.t, sailed)
     return float(then - before) / length
 
 
@@ -169,10 +163,11 @@ def switch_heading_deg(trial: Trial) -> float | None:
     """Heading change at which the rudder was to be reversed, degrees; None if never.
 
     Orders are given in whole degrees, in trials nearly always 1 or a multiple of 5, and
-    carried out after a delay in which the heading moves on. So it is the largest such
-    angle that had been reached, to 5 per cent, at the first reversal; where that lies
-    more than 3 degrees back, the heading of the reversal itself. Where orders are
-    recorded, it was reached in the sampling step of the first reversal.
+    carried out after a delay in which the heading moves on, by up to 3 degrees or 0.6 s
+    of turning. So it is such an angle that had been reached, to 5 per cent, at the
+    first reversal: the angle of the rudder, as in a 20/20 zigzag, else the largest;
+    without one the heading of the reversal itself. Where orders are recorded, it was
+    reached in the sampling step of the first reversal.
     """
     start, turns = reversals(trial)
     if not turns:
@@ -180,22 +175,24 @@ def switch_heading_deg(trial: Trial) -> float | None:
     turn = turns[0]
     row = int(np.clip(np.searchsorted(trial.t, turn), 1, len(trial) - 1))
     step = float(trial.t[row] - trial.t[row - 1])  # that ends at the turn or spans it
-    around = _heading_change(trial, start, [turn - step, turn])
-    changes_deg = np.degrees(np.abs(around))
-    before, at = sorted(changes_deg.tolist())
-    usual = [1.0, *range(5, 95, 5)]
+    change_deg = np.abs(_heading_change_deg(trial, start))
+    times = [turn - 1.0, turn - step, turn]
+    second_before, before, at = np.interp(times, trial.t, change_deg).tolist()
+
+    rudder_deg = np.degrees(usual_rudder(trial))
+    angles = [*range(90, 0, -5), 1]
+    angles.sort(key=lambda angle: abs(angle - rudder_deg) > 1.0)
     if is_ordered(trial):
         slack = 1e-6 + min(3.0 * course_error_deg(trial), 2.0)
-        whole = float(np.floor(at + 1e-6))
-        for angle in (*reversed(usual), whole):
-            if before - slack <= angle <= at + slack:
-                return float(angle)
-        return float(0.5 * (before + at))
-
-    passed = [float(angle) for angle in usual if 0.95 * angle <= at]
-    if passed and at - passed[-1] < 3.0:
-        return passed[-1]
-    return float(at)
+        lowest, highest = min(before, at) - slack, max(before, at) + slack
+        angles.append(int(max(before, at) + 1e-6))
+        otherwise = 0.5 * (before + at)
+    else:
+        yaw_rate = abs(at - second_before)  # deg/s
+        lowest, highest = at - max(3.0, 0.6 * yaw_rate), at / 0.95
+        otherwise = at
+    fitting = [angle for angle in angles if lowest <= angle <= highest]
+    return float(fitting[0]) if fitting else float(otherwise)
 
 
 def course_error_deg(trial: Trial) -> float:
@@ -208,28 +205,22 @@ def course_error_deg(trial: Trial) -> float:
     return float(np.degrees(np.std(approach)))
 
 
-def _heading_change(
-    trial: Trial, start: float, times: Sequence[float] | Floats
-) -> Floats:
-    """Heading at some times less the mean heading up to the start, rad."""
+def _heading_change_deg(trial: Trial, start: float) -> Floats:
+    """Heading less its mean up to the start, degrees."""
     psi = trial["psi"]
-    is_before = trial.t <= start
-    approach = psi[is_before].mean()
-    heading = np.interp(times, trial.t, psi)
-    return np.asarray(heading - approach)
+    approach = psi[trial.t <= start].mean()
+    return np.asarray(np.degrees(psi - approach))
 
 
 def _overshoot_deg(
-    trial: Trial, start: float, turn: float, end: float, switch: float | None
+    trial: Trial, start: float, turn: float, end: float, switch: float
 ) -> float | None:
     """Heading beyond that of the reversal at time `turn`; None if growing at `end`."""
-    t = trial.t
-    times = t[(t >= turn) & (t <= end)]
-    if switch is None or len(times) < 3:
+    is_after = (trial.t >= turn) & (trial.t <= end)
+    change_deg = _heading_change_deg(trial, start)[is_after]
+    if len(change_deg) < 3:
         return None
-    change = _heading_change(trial, start, times)
-    side = np.sign(change[0])
-    change_deg = np.degrees(side * change)
+    change_deg *= np.sign(change_deg[0])
     largest = int(np.argmax(change_deg))
     if largest == len(change_deg) - 1:
         return None

@@ -49,6 +49,20 @@ def test_indices_of_a_zigzag_drawn_by_hand(triangle):
     assert indices.period_s is None
 
 
+@pytest.mark.parametrize(
+    ("rudder", "rate", "seen", "ordered"),
+    [(20, 9, 24, 20), (20, 0.6, 25, 25), (10, 9, 13.6, 10), (10, 0.6, 20.4, 20)],
+)
+def test_a_rudder_moves_after_the_heading_of_its_order(rudder, rate, seen, ordered):
+    """A zigzag is named by the heading of the order: fast boats turn on meanwhile."""
+    t = np.arange(0.0, 5.0 + 3.0 * seen / rate, 0.1)
+    reversal = 5.0 + seen / rate
+    psi = np.interp(t, [5.0, reversal, t[-1]], [0.0, seen, -seen])
+    sides = (t >= 5.0).astype(float) - 2.0 * (t >= reversal)
+    trial = Trial(t, {"psi": np.radians(psi), "delta": np.radians(rudder * sides)})
+    assert manoeuvres.switch_heading_deg(trial) == ordered
+
+
 def test_a_perfect_circle():
     """R = 300 m at 6 m/s from the start.
 
