@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 from identification.progress import counted
 from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 from shipgym.manoeuvres import Criterion, IndexInterval, Manoeuvre
 from shipgym.manoeuvres.imo import imo_criteria
 from shipgym.manoeuvres.intervals import intervals_of
-from shipgym.manoeuvres.standard import families_of
+from shipgym.manoeuvres.standard import standard_manoeuvres
 from shipgym.models import ShipModel
 from shipgym.trials.trial import Trial
 
@@ -20,8 +20,6 @@ class StandardTrials:
 
     Attributes
     ----------
-    families : dict
-        Manoeuvres by family and name.
     runs : dict
         Simulation of each manoeuvre with the model itself.
     indices : dict
@@ -34,7 +32,6 @@ class StandardTrials:
         Number of models drawn.
     """
 
-    families: dict[str, dict[str, Manoeuvre]]
     runs: dict[str, Trial]
     indices: dict[str, dict[str, IndexInterval]]
     criteria: dict[str, Criterion]
@@ -70,47 +67,35 @@ def standard_trials(model: ShipModel, draws: int = 0, seed: int = 0) -> Standard
     seed : int
         Seed of the draws.
     """
-    families = families_of(model)
-    manoeuvres: dict[str, Manoeuvre] = {}
-    for family in families.values():
-        manoeuvres |= family
-
-    nominal = _simulate(model, manoeuvres)
+    manoeuvres = standard_manoeuvres(model)
+    runs, own, refused = _simulate(model, manoeuvres)
     drawn = []
     if draws and model.covariance is not None:
         drawn = model.sample(draws, seed)
     evaluate = {name: manoeuvre.evaluate for name, manoeuvre in manoeuvres.items()}
-    sailed = counted("models drawn", drawn)
-    indices = intervals_of(nominal.indices, sailed, evaluate)
+    indices = intervals_of(own, counted("models drawn", drawn), evaluate)
     return StandardTrials(
-        families=families,
-        runs=nominal.runs,
+        runs=runs,
         indices=indices,
         criteria=imo_criteria(model, indices),
-        refused=nominal.refused,
+        refused=refused,
         draws=len(drawn),
     )
 
 
-class _Nominal(NamedTuple):
+def _simulate(
+    model: ShipModel, manoeuvres: Mapping[str, Manoeuvre]
+) -> tuple[dict[str, Trial], dict[str, Any], dict[str, str]]:
     """Manoeuvres of the model itself: runs, indices, and why there are none."""
-
-    runs: dict[str, Trial]
-    indices: dict[str, dict[str, float | None]]
-    refused: dict[str, str]
-
-
-def _simulate(model: ShipModel, manoeuvres: Mapping[str, Manoeuvre]) -> _Nominal:
-    nominal = _Nominal({}, {}, {})
+    runs, indices, refused = {}, {}, {}
     for name, manoeuvre in manoeuvres.items():
-        nominal.indices[name] = manoeuvre.no_indices
+        indices[name] = manoeuvre.no_indices
         try:
-            run = manoeuvre.sail(model)
-            nominal.runs[name] = run
-            nominal.indices[name] = asdict(manoeuvre.indices(run))
+            runs[name] = manoeuvre.sail(model)
+            indices[name] = asdict(manoeuvre.indices(runs[name]))
         except (InputError, ManoeuvreError, UnstableModelError) as error:
-            nominal.refused[name] = str(error)
+            refused[name] = str(error)
             last_error = error
-    if manoeuvres and not nominal.runs:
+    if manoeuvres and not runs:
         raise last_error
-    return nominal
+    return runs, indices, refused

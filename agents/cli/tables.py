@@ -54,13 +54,15 @@ def between(ends: tuple[float | None, float | None] | None, decimals: int) -> st
 def prediction_table(result: IdentificationResult, note: str = "") -> Table:
     """Errors of the open-loop simulation of each trial, and its indices."""
     title = "Open-loop simulation of the trials: root mean square errors"
-    table = plain_table(f"{title}, {note}" if note else title)
-    table.add_column("trial", overflow="fold")
-    table.add_column("use")
-    for heading in ("heading\ndeg", "yaw rate\ndeg/s", "surge\nm/s", "sway\nm/s"):
-        table.add_column(heading, justify="right")
-    table.add_column(
-        "measured → predicted\n(→ rudder reversed at headings)", no_wrap=True
+    table = plain_table(
+        f"{title}, {note}" if note else title,
+        "trial",
+        "use",
+        ">heading\ndeg",
+        ">yaw rate\ndeg/s",
+        ">surge\nm/s",
+        ">sway\nm/s",
+        "measured → predicted\n(→ rudder reversed at headings)",
     )
 
     from identification.report.view import index_lines

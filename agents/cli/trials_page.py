@@ -6,7 +6,7 @@ from typing import Any
 from agents.cli.standard_trials import StandardTrials
 from agents.verification.figures import in_words
 from shipgym.files import write_text
-from shipgym.manoeuvres.standard import FAMILIES, Manoeuvre
+from shipgym.manoeuvres.standard import FAMILIES, Manoeuvre, families_of
 from shipgym.models import ShipModel
 from shipgym.pages import render
 from shipgym.plots import manoeuvre_figure, path_figure
@@ -18,7 +18,7 @@ Figure = tuple[str, Any, str]
 def write_page(model: ShipModel, trials: StandardTrials, path: Path) -> None:
     """Write indices, criteria and figures as one self-contained page."""
     sections = []
-    for name, family in trials.families.items():
+    for name, family in families_of(model).items():
         if family:
             sections.append(_section(name, family, trials))
     page = render(

@@ -254,9 +254,7 @@ class Criterion:
         """Probability to pass, by trials and models drawn; None if undecided."""
         if not self.decided or self.drawn is None:
             return None
-        n_draws = len(self.drawn.values)
-        by_value = self.measured is None and not n_draws
-        if by_value:
+        if self.measured is None and not len(self.drawn.values):
             return None
         certainty = max(self._chances)
         return certainty if self.passed else 1.0 - certainty

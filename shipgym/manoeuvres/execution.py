@@ -29,24 +29,22 @@ def usual_rudder(trial: Trial) -> float:
     return float(np.percentile(np.abs(rudder(trial)), 75))
 
 
+def first_held(trial: Trial) -> int:
+    """Sample from which the rudder is held; smaller angles on the approach are not."""
+    least = 0.5 * usual_rudder(trial)
+    return int(np.argmax(np.abs(rudder(trial)) > least))
+
+
 def execute_time(trial: Trial) -> float:
     """Time at which the first rudder order of a manoeuvre was given, s."""
     t = trial.t
     delta = rudder(trial)
     if is_ordered(trial):
-        # small rudder angles on the approach are not an order
-        least = 0.5 * usual_rudder(trial)
-        first = np.argmax(np.abs(delta) > least)
-        return float(t[first])
+        return float(t[first_held(trial)])
 
     move = np.abs(delta - delta[0])
-    left = departure(
-        t,
-        move,
-        reach=float(np.percentile(move, 75)),
-        fastest=_fastest_rate(t, delta),
-    )
-    return max(left, float(t[0]))
+    reach = float(np.percentile(move, 75))
+    return max(departure(t, move, reach, _fastest_rate(t, delta)), float(t[0]))
 
 
 def reversals(trial: Trial) -> tuple[float, list[float]]:
@@ -58,10 +56,9 @@ def reversals(trial: Trial) -> tuple[float, list[float]]:
     t = trial.t
     delta = rudder(trial)
     start = execute_time(trial)
-    usual = usual_rudder(trial)
     ordered = is_ordered(trial)
     part = ORDERED if ordered else MEASURED
-    holds = _holds(t, delta, start, part * usual)
+    holds = _holds(t, delta, start, part * usual_rudder(trial))
     if not ordered:
         return start, _departures(t, delta, holds)
     return start, t[[hold[0] for hold in holds[1:]]].tolist()
@@ -72,16 +69,9 @@ def _departures(t: Floats, delta: Floats, holds: list[Floats]) -> list[float]:
     fastest = _fastest_rate(t, delta)
     times = []
     for hold, after in pairwise(holds):
-        held_at = np.median(delta[hold])
         moving = slice(hold[-1], after[0] + 1)
-        move = np.abs(delta[moving] - held_at)
-        time = departure(
-            t[moving],
-            move,
-            reach=float(move.max()),
-            fastest=fastest,
-        )
-        times.append(time)
+        move = np.abs(delta[moving] - np.median(delta[hold]))
+        times.append(departure(t[moving], move, float(move.max()), fastest))
     return times
 
 
@@ -112,9 +102,7 @@ def departure(t: Floats, move: Floats, reach: float, fastest: float) -> float:
     half = move >= 0.5 * reach
     upper = int(np.argmax(half))
     still = np.flatnonzero(move[:upper] <= 0.1 * reach)
-    lower = 0
-    if len(still):
-        lower = int(still[-1]) + 1
+    lower = int(still[-1]) + 1 if len(still) else 0
 
     slope = 0.0
     if upper > lower:

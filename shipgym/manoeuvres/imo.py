@@ -81,19 +81,11 @@ def imo_criteria(
         for name, is_outside in outside.items():
             if name.startswith(rule.manoeuvre):
                 side = "port" if "port" in name else "starboard"
-                indices = found[name]
-                known = Side(
-                    name=side,
-                    drawn=indices[rule.index],
-                    outside=is_outside,
-                )
-                sides.append(known)
+                sides.append(Side(side, found[name][rule.index], is_outside))
         trial = trial_in_words(model, rule.manoeuvre)
         criteria[criterion] = Criterion(rule, trial, tuple(sides))
-    stop = found.get(STOPPING.manoeuvre)
-    criteria["stopping"] = stopping_criterion(stop)
-    measured = measured_in_file(model)
-    return with_measured(criteria, measured)
+    criteria["stopping"] = stopping_criterion(found.get(STOPPING.manoeuvre))
+    return with_measured(criteria, measured_in_file(model))
 
 
 def stopping_criterion(stop: Mapping[str, IndexInterval] | None) -> Criterion:

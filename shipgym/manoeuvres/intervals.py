@@ -48,17 +48,14 @@ class IndexInterval:
         interval where more than 2.5 per cent of the draws have none; so has one without
         draws.
         """
-        known = self.values[~np.isnan(self.values)]
-        n_without = len(self.values) - len(known)
         if not len(self.values):
             return None
-        if not self.is_size and (
-            self.value is None or n_without > LEVELS_95[0] * len(self.values)
-        ):
-            return None
+        is_lost = np.isnan(self.values)
+        known = self.values[~is_lost]
         if self.is_size:
-            lost = np.full(n_without, np.inf)
-            known = np.concatenate([np.maximum(known, 0.0), lost])
+            known = np.where(is_lost, np.inf, np.maximum(self.values, 0.0))
+        elif self.value is None or is_lost.mean() > LEVELS_95[0]:
+            return None
         with np.errstate(invalid="ignore"):  # between a value and infinity
             low, high = np.quantile(known, LEVELS_95).tolist()
         if self.value is None:  # the model itself did not complete it
@@ -102,14 +99,9 @@ class IndexInterval:
     @property
     def lost_in_words(self) -> str:
         """Say how many draws have no value."""
+        lost = {"ran away": self.n_ran_away, "did not finish": self.n_never_reached}
         draws = len(self.values)
-        of_draws = f"of {draws} draws"
-        lost = []
-        if self.n_ran_away:
-            lost.append(f"{self.n_ran_away} {of_draws} ran away")
-        if self.n_never_reached:
-            lost.append(f"{self.n_never_reached} {of_draws} did not finish")
-        return ", ".join(lost)
+        return ", ".join(f"{n} of {draws} draws {how}" for how, n in lost.items() if n)
 
 
 @takes_name

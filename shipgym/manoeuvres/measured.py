@@ -24,7 +24,7 @@ from shipgym.checks import (
     unexpected,
 )
 from shipgym.errors import InputError
-from shipgym.manoeuvres.execution import rudder, usual_rudder
+from shipgym.manoeuvres.execution import first_held, rudder, usual_rudder
 from shipgym.manoeuvres.imo_rules import RULES, Rule
 from shipgym.manoeuvres.turning import full_rudder_deg, turning_indices
 from shipgym.manoeuvres.zigzags import (
@@ -140,7 +140,8 @@ def _with_errors(
     repetitions = _repetitions(smooth, noise, period)
     repeated = [_values(model, again, rules) for again in repetitions]
     found = {}
-    side = first_side(trial)
+    is_starboard = rudder(trial)[first_held(trial)] > 0.0
+    side = "starboard" if is_starboard else "port"
     for name, value in values.items():
         scatter = np.std([again.get(name, value) for again in repeated])
         unseen = _unseen_error(model, smooth, noise, rules[name])
@@ -173,18 +174,15 @@ def smoothed(trial: Trial, period: float) -> tuple[Trial, dict[str, float]]:
     t = trial.t
     # degrees of freedom of the spline, of each sample: the mean of its low pass
     freedom = np.pi * _step(t) / (np.sqrt(2.0) * period)
-    kept = 1.0 - min(freedom, 0.9)
-    unbiased = 1.0 / np.sqrt(kept)
+    kept = np.sqrt(1.0 - min(freedom, 0.9))
 
     smooth = {}
     noise = {}
     for name in ("psi", "x", "y"):
         if name not in trial:
             continue
-        channel = trial[name]
-        smooth[name] = _low_pass(name, t, channel, period)
-        residuals = channel - smooth[name]
-        noise[name] = float(np.std(residuals)) * unbiased
+        smooth[name] = _low_pass(name, t, trial[name], period)
+        noise[name] = float(np.std(trial[name] - smooth[name]) / kept)
     return trial.with_channels(smooth), noise
 
 
@@ -256,23 +254,13 @@ def _step(t: Floats) -> float:
     return float(np.median(np.diff(t)))
 
 
-def first_side(trial: Trial) -> str:
-    """Side to which the rudder was first held, "starboard" or "port"."""
-    delta = rudder(trial)
-    half = 0.5 * usual_rudder(trial)
-    is_held = np.abs(delta) > half
-    first = int(np.argmax(is_held))
-    return "starboard" if delta[first] > 0.0 else "port"
-
-
 def _at_speed(model: ShipModel, trial: Trial) -> bool:
     """Return whether a trial begins at service speed, to a tenth."""
     if "u" not in trial or "v" not in trial:
         return False
     service = model.particulars["speed"]
     first = np.hypot(trial["u"][0], trial["v"][0])
-    off = abs(first - service)
-    return bool(off <= 0.1 * service)
+    return bool(abs(first / service - 1.0) <= 0.1)
 
 
 def _manoeuvre_of(model: ShipModel, trial: Trial) -> str | None:
@@ -283,8 +271,6 @@ def _manoeuvre_of(model: ShipModel, trial: Trial) -> str | None:
         return "turning circle" if off <= 1.0 else None
     heading_deg = switch_heading_deg(trial) or 0.0
     for angle in STANDARD_DEG:
-        rudder_off = abs(rudder_deg - angle)
-        heading_off = abs(heading_deg - angle)
-        if rudder_off <= 1.0 and heading_off <= 1.0:
+        if max(abs(rudder_deg - angle), abs(heading_deg - angle)) <= 1.0:
             return f"zigzag {angle:.0f}/{angle:.0f}"
     return None

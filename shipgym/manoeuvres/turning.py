@@ -10,8 +10,10 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import (
     execute_time,
+    first_held,
     number_of_steps,
     reached,
+    rudder,
     ship_length,
 )
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
@@ -66,10 +68,10 @@ def turning_circle(
     check_number(rudder_deg, "rudder_deg", at_least=-90.0, at_most=90.0)
     if rudder_deg == 0.0:
         raise InputError("rudder_deg: expected an angle that turns the ship, got 0")
-    rudder = np.full(number_of_steps(duration, dt), np.radians(rudder_deg))
+    ordered = np.full(number_of_steps(duration, dt), np.radians(rudder_deg))
     return simulate(
         model,
-        orders(model, rudder),
+        orders(model, ordered),
         dt,
         water_depth=water_depth,
         kind="turning-circle",
@@ -81,8 +83,9 @@ def turning_circle(
 def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices:
     """Advance, transfer, diameters and the steady turn of a turning circle.
 
-    The trial has x, y, psi, u, v, r and delta (or delta_command); `length` is that
-    between perpendiculars, m, by default the trial's own. Raises InputError if a
+    The trial has x, y, psi, u, v, r and delta (or delta_command), and ends for them
+    when the rudder is released; `length` is that between perpendiculars, m, by default
+    the trial's own. Raises InputError if a
     channel or the length is missing.
     """
     lpp = ship_length(trial, length)
@@ -97,6 +100,10 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
     heading = float(trial["psi"][0] - turned[0])
     ahead, aside = rotate_to_body(since("x"), since("y"), heading)
     side = 1.0 if turned[-1] >= 0.0 else -1.0
+    delta = rudder(trial)
+    first = delta[first_held(trial)]
+    held = np.flatnonzero(delta * first >= 0.75 * first**2)
+    after[held[-1] + 1 :] = False
     ahead = ahead[after] / lpp
     aside = side * aside[after] / lpp
     turned = side * turned[after]

@@ -173,11 +173,10 @@ def switch_heading_deg(trial: Trial) -> float | None:
     if not turns:
         return None
     turn = turns[0]
-    row = int(np.clip(np.searchsorted(trial.t, turn), 1, len(trial) - 1))
-    step = float(trial.t[row] - trial.t[row - 1])  # that ends at the turn or spans it
     change_deg = np.abs(_heading_change_deg(trial, start))
-    times = [turn - 1.0, turn - step, turn]
-    second_before, before, at = np.interp(times, trial.t, change_deg).tolist()
+    before = float(change_deg[np.searchsorted(trial.t, turn) - 1])
+    times = [turn - 1.0, turn]
+    second_before, at = np.interp(times, trial.t, change_deg).tolist()
 
     rudder_deg = np.degrees(usual_rudder(trial))
     angles = [*range(90, 0, -5), 1]

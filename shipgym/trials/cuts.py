@@ -44,6 +44,32 @@ def cut_log(cut: Any, log: Log, where: str) -> list[slice]:
     return parts
 
 
+def kind_of(rudder: Floats, psi: Floats) -> str | None:
+    """Manoeuvre of a part, by its rudder and heading, rad; None where they do not tell.
+
+    In a turning circle the ship goes round by more than half a circle with the rudder
+    held. In a zigzag the rudder is held to one side after the other and reversed each
+    time that the heading has changed as much to that side.
+    """
+    size = np.abs(rudder)
+    usual = np.percentile(size, 75)
+    held = np.flatnonzero(size > 0.75 * usual)
+    if usual < 3.0 * DEGREE:
+        return None
+    is_reversed = np.diff(np.sign(rudder[held])) != 0.0
+    ends = [*held[:-1][is_reversed], held[-1]][:4]
+    turned = np.sign(rudder[ends]) * (psi[ends] - psi[: held[0] + 1].mean())
+    *reversals, _ = turned.tolist()
+    if (
+        size[: ends[0] + 1].max() > usual + 2.0 * DEGREE
+    ):  # another manoeuvre goes before
+        return None
+    if turned[0] > np.pi:
+        return "turning-circle"
+    is_even = len(reversals) > 1 and np.ptp(reversals) < 0.3 * np.mean(reversals)
+    return "zigzag" if is_even else None
+
+
 def runs(t: Floats) -> list[list[float]]:
     """First and last time, s, of the parts of a log between long gaps."""
     is_gap = np.diff(t) > max(60.0, 20.0 * usual_step(t))

@@ -27,7 +27,7 @@ from shipgym.files import write_text
 from shipgym.trials.axes import plot
 from shipgym.trials.columns import parse_columns
 from shipgym.trials.conventions import Conventions, Installation
-from shipgym.trials.cuts import cut_log
+from shipgym.trials.cuts import cut_log, kind_of
 from shipgym.trials.plausibility.agreement import rate_gain
 from shipgym.trials.readers.frames import read_frame
 from shipgym.trials.readers.kinds import read_log
@@ -396,14 +396,18 @@ def trial_of(log: Log, name: str, samples: slice = slice(None), **facts: Any) ->
 
 
 def cut_trials(cut: Any, log: Log, name: str, where: str, **facts: Any) -> list[Trial]:
-    """Trials of the stretches of a cut log (:func:`.cut_log`), named by seconds."""
-    parts = cut_log(cut, log, where)
-    spans = [log.t[samples][[0, -1]].round().astype(int) for samples in parts]
-    names = [f"{name} {first}-{last} s" for first, last in spans]
-    return [
-        trial_of(log, own_name, samples, **facts)
-        for own_name, samples in zip(names, parts, strict=True)
-    ]
+    """Trials of the stretches of a cut log (:func:`.cut_log`), named by seconds.
+
+    One that was given no kind has that which its rudder and heading show.
+    """
+    trials = []
+    for samples in cut_log(cut, log, where):
+        first, last = log.t[samples][[0, -1]]
+        trial = trial_of(log, f"{name} {first:.0f}-{last:.0f} s", samples, **facts)
+        if trial.kind is None and {"delta", "psi"} <= trial.channels.keys():
+            trial = trial.with_(kind=kind_of(trial["delta"], trial["psi"]))
+        trials.append(trial)
+    return trials
 
 
 def _check_time(

@@ -1,5 +1,6 @@
 """One TOML file says what ship it is, how to read its data and what trials are for."""
 
+import re
 import tomllib
 from functools import partial
 from pathlib import Path
@@ -284,3 +285,14 @@ def test_every_measured_trial_is_imported(path):
         yaw_rate, rudder = trial["r"][steps], trial["delta"][steps]
         change, level = np.diff(yaw_rate), np.column_stack([yaw_rate[:-1], rudder[:-1]])
         assert np.linalg.lstsq(level, change, rcond=None)[0][1] > 0.0
+
+
+@needs_data
+def test_a_part_without_kind_has_that_which_rudder_and_heading_show(tmp_path):
+    text = re.sub(
+        "kind = .*", "cut = [[0, 1e9]]", (SHIPS / "esso_osaka_3m.toml").read_text()
+    )
+    path = tmp_path / "ship.toml"
+    path.write_text(text.replace("../../../shared/data", str(DATA)))
+    kinds = [trial.kind for trial in ShipFile.load(path).trials()]
+    assert kinds[:5:2] == [None, "turning-circle", "zigzag"]
