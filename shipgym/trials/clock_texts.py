@@ -3,6 +3,7 @@
 import re
 import warnings
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -63,11 +64,7 @@ def _moments(series: Any, day_first: bool) -> Any:
     """Moments of texts, by the form of the first one where they have it."""
     import pandas as pd
 
-    def read(texts: Any, **form: str) -> Any:
-        return pd.to_datetime(
-            texts, utc=True, dayfirst=day_first, errors="coerce", **form
-        )
-
+    read = partial(pd.to_datetime, utc=True, dayfirst=day_first, errors="coerce")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the other order
         moments = read(series)

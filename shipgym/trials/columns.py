@@ -93,11 +93,11 @@ class Locator:
         column = self.columns[channel].name
         return self.table.cell(row, column)
 
-    def in_file(self, channel: str, value: float, digits: int = 6) -> str:
+    def in_file(self, channel: str, value: float) -> str:
         """A value in SI units as the file has it, such as "12.5 deg"."""
         unit = self.columns[channel].unit
         number = value / si_factor(channel, unit)
-        return f"{number:.{digits}g} {unit}"
+        return f"{number:.10g} {unit}"
 
     def declaration(self, channel: str, unit: str) -> str:
         """Declaration of another unit: ``r = { column = "yaw", unit = "deg/s" }``."""

@@ -60,11 +60,6 @@ class Installation:
             rudder_offset=_radians(table, "rudder_offset_deg", where),
         )
 
-    @property
-    def is_at_midship(self) -> bool:
-        """True if the antenna is at midship, or not known to be elsewhere."""
-        return self.forward == 0.0 and self.starboard == 0.0
-
 
 def _radians(table: Mapping[str, Any], key: str, where: str) -> float:
     """An angle in rad, of one in degrees."""

@@ -84,7 +84,8 @@ def _to_midship(
     differ enough to tell it, of x and y. Raises InputError for GNSS without a heading.
     """
     channels = log.channels
-    is_moved = log.has("x", "y") and not installation.is_at_midship
+    is_elsewhere = installation.forward or installation.starboard
+    is_moved = log.has("x", "y") and is_elsewhere
     is_track_alone = log.has("x") and not log.has("delta")
     if is_moved or (log.has("ground_north") and not is_track_alone):
         log.needed("psi", "positions or velocities of GNSS")

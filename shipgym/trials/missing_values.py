@@ -23,9 +23,7 @@ def check_time(t: Floats, locator: Locator) -> None:
     if not stands_still.any():
         return
     row = int(np.argmax(stands_still)) + 1
-    earlier, later = (
-        locator.in_file("t", one, digits=10) for one in t[row - 1 : row + 1]
-    )
+    earlier, later = (locator.in_file("t", one) for one in t[row - 1 : row + 1])
     change = f"goes back from {earlier} to {later}"
     if t[row] >= t[row - 1]:
         change = f"stands still at {later}"

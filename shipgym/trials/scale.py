@@ -17,20 +17,23 @@ def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
     These are yaw rates and speeds of another scale. The service speed counts where it
     is given; `where` begins the messages.
     """
-    if "u" in trial:
-        speed = np.hypot(trial["u"], trial.channels.get("v", 0.0))
-        _check_speed(_largest(speed), ship, where)
-        most_per_length = 3.0  # |r| L / U; a ship in its tightest turn is below about 1
-        fastest = float(speed.max())
-        limit_deg = math.degrees(most_per_length * fastest / ship.length)
-        turning_deg = math.degrees(_largest(trial["r"])) if "r" in trial else 0.0
-        if turning_deg > limit_deg:
-            raise InputError(
-                f"{where}: expected a yaw rate of at most {limit_deg:.4g} deg/s at up"
-                f" to {fastest:.4g} m/s for a length of {ship.length:g} m, got up to"
-                f" {turning_deg:.4g} deg/s; likely the trial of another ship or scale,"
-                " or a wrong unit of r, psi, u or v in [columns], or of [ship] length"
-            )
+    if "u" not in trial:
+        return
+    speed = np.hypot(trial["u"], trial.channels.get("v", 0.0))
+    _check_speed(_largest(speed), ship, where)
+    if "r" not in trial:
+        return
+    most_per_length = 3.0  # |r| L / U; a ship in its tightest turn is below about 1
+    fastest = float(speed.max())
+    limit_deg = math.degrees(most_per_length * fastest / ship.length)
+    turning_deg = math.degrees(_largest(trial["r"]))
+    if turning_deg > limit_deg:
+        raise InputError(
+            f"{where}: expected a yaw rate of at most {limit_deg:.4g} deg/s at up to"
+            f" {fastest:.4g} m/s for a length of {ship.length:g} m, got up to"
+            f" {turning_deg:.4g} deg/s; likely the trial of another ship or scale, or a"
+            " wrong unit of r, psi, u or v in [columns], or of [ship] length"
+        )
 
 
 def _largest(values: Floats) -> float:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, integral
 from shipgym.checks import (
     check_choice,
     check_finite,
@@ -28,7 +28,7 @@ from shipgym.trials.axes import plot
 from shipgym.trials.columns import parse_columns
 from shipgym.trials.conventions import Conventions, Installation
 from shipgym.trials.cuts import cut_log, kind_of
-from shipgym.trials.plausibility.agreement import rate_gain
+from shipgym.trials.plausibility.agreement import turning_gain
 from shipgym.trials.readers.frames import read_frame
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable
@@ -435,7 +435,8 @@ def _check_angles(t: Floats, channels: Mapping[str, Floats], where: str) -> None
         if abs(values[k]) > (1.0 + 1e-9) * LARGEST_MAGNITUDES[name]:
             raise _in_degrees(where, name, f" ({values[k]:g} in sample {k})")
     if {"psi", "r"} <= channels.keys():
-        gain = abs(rate_gain(t, channels["psi"], channels["r"]))
+        swept = integral(t, channels["r"])
+        gain = abs(turning_gain(t, channels["psi"], swept))
         in_degrees = {"psi": gain * DEGREE, "r": gain / DEGREE}
         for name, factor in in_degrees.items():
             if 0.5 < factor < 2.0:

@@ -110,12 +110,9 @@ def _check_channels(log: Log, conventions: Conventions) -> list[str]:
     remarks = lacking(log.channels)
     remarks += frozen_heading(log)
     remarks += check_steps(log.t, locator)
-    has_velocity = log.has("ground_north")
-    if "lat" in locator.columns or has_velocity:
-        check_over_ground(log, conventions, locator)
-    tells_speed = log.has("x", "y") or has_velocity
     tells_turning = log.has("psi") or log.has("r")
-    if tells_speed:
+    if log.has("x", "y") or log.has("ground_north"):
+        check_over_ground(log, conventions, locator)
         check_speed_units(log, locator)
     if tells_turning:
         check_rudder_unit(log, locator)
@@ -123,5 +120,6 @@ def _check_channels(log: Log, conventions: Conventions) -> list[str]:
         check_yaw_rate(log, locator)
     if log.has("x", "y", "psi", "u", "v"):
         check_velocity(log, conventions.velocity_frame, locator)
-    check_rudder_side(log)
+    if tells_turning and log.has("delta"):
+        check_rudder_side(log)
     return remarks

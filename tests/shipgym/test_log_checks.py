@@ -36,6 +36,7 @@ SWING = 0.5 * np.sin(0.05 * T)
 RATE = np.gradient(SWING)
 U, V = np.full(T.size, 5.0), np.zeros(T.size)
 X, Y = 5.0 * np.sin(TURN) / 0.02, 5.0 * (1.0 - np.cos(TURN)) / 0.02
+ROUND = 0.1 * np.clip(T - 100.0, 0.0, 60.0)  # after a dull stretch
 
 
 def at(values, row, value):
@@ -86,6 +87,7 @@ def at(values, row, value):
         ({"psi": SWING, "delta": np.where(T < 50, NAN, 0.0)}, "expected a number, got"),
         ({"ground": U}, "no column is named like a channel"),
         ({"psi": 2.0 * TURN, "delta": V - 0.5, "u": U}, "with the rudder to one side"),
+        ({"psi": ROUND, "delta": -5.0 * np.gradient(ROUND)}, "rudder to one side"),
     ],
 )
 def test_what_no_ship_does_is_refused_with_a_remedy(tmp_path, columns, message):

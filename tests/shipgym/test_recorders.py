@@ -160,6 +160,14 @@ def test_a_heading_that_is_stuck_is_noted(tmp_path):
     assert "the heading stands still from" in " ".join(guess.trial.notes)
 
 
+def test_the_course_tells_the_unit_of_a_heading_that_goes_on_after_a_turn(tmp_path):
+    places = {"Lat": [one.lat for one in SHIP], "Lon": [one.lon for one in SHIP]}
+    columns = plain(Heading=PSI + 4.0 * np.pi, **places)
+    guess = guessed(tmp_path, table(columns, *columns.values()))
+    assert guess.reading["psi"].startswith("column 'Heading' in rad, unit fits where")
+    assert turned(guess.trial) < 0.1
+
+
 def test_units_that_a_name_or_recorder_defines_are_known(tmp_path):
     yaw = np.unwrap(PSI) - PSI[0]
     names = ["TIMESTAMPms", "M1ATTITUDEyaw", "M1ATTITUDEyawspeed", "rudcmd"]

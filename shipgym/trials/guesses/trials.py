@@ -267,9 +267,9 @@ def _rudder_side(guess: TrialGuess, trial: Trial) -> RudderSide | None:
     rudder = trial.channels.get("delta", command)
     if "psi" not in trial or rudder is None:
         return None
-    names = [one.name for one in guess.columns if one.channel in RUDDERS]
-    for name in names:
-        if number_with_side(guess.table.first_text(name)) is not None:
+    for one in guess.columns:
+        text = guess.table.first_text(one.name)
+        if one.channel in RUDDERS and number_with_side(text) is not None:
             return RudderSide("starboard", "the letters S and P of its values")
     found = rudder_side(trial.t, trial["psi"], rudder)
     is_turned = any(one.name == "rudder_positive" for one in guess.conventions)

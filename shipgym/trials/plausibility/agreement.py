@@ -16,13 +16,12 @@ from shipgym.trials.resampling import Log, changes, usual_step
 from shipgym.trials.units import DEGREE, fitting_units
 
 
-def rate_gain(t: Floats, psi: Floats, r: Floats) -> float:
-    """How many times as fast a heading changes as the yaw rate says; 1 for no verdict.
+def turning_gain(t: Floats, psi: Floats, swept: Floats) -> float:
+    """How many times as fast a heading changes as another angle; 1 for no verdict.
 
-    The channels are in SI units, the heading without jumps.
+    That is a yaw rate's integral, or the course. In SI units, without jumps.
     """
     turned = _without_trend(t, psi)
-    swept = integral(t, r)
     expected = _without_trend(t, swept)
     largest = max(np.ptp(turned), np.ptp(expected))
     if largest < 2.0 * DEGREE:
@@ -53,7 +52,8 @@ def _without_trend(t: Floats, values: Floats) -> Floats:
 
 def check_yaw_rate(log: Log, locator: Locator) -> None:
     """Refuse a yaw rate that cannot be the heading's, by its sign or its size."""
-    gain = rate_gain(log.t, log.channels["psi"], log.channels["r"])
+    swept = integral(log.t, log.channels["r"])
+    gain = turning_gain(log.t, log.channels["psi"], swept)
     heading, rate = (locator.columns[channel].name for channel in ("psi", "r"))
     expected = f"{locator.path}: expected columns '{heading}' (heading) and '{rate}'"
     if gain < 0.0:
@@ -63,7 +63,7 @@ def check_yaw_rate(log: Log, locator: Locator) -> None:
             " column that is positive to port"
         )
     if gain != 1.0:
-        proposals = _nearest_units(gain, locator)
+        proposals = _nearest_units(locator, psi=1.0 / gain, r=gain)
         declarations = [locator.declaration(*one) for one in proposals]
         alternatives = " or ".join(declarations) or "the unit of each"
         raise InputError(
@@ -74,10 +74,10 @@ def check_yaw_rate(log: Log, locator: Locator) -> None:
         )
 
 
-def _nearest_units(gain: float, locator: Locator) -> list[tuple[str, str]]:
-    """Units of which one would bring heading and yaw rate together, by channel."""
+def _nearest_units(locator: Locator, **ratios: float) -> list[tuple[str, str]]:
+    """Units of channels that are so many times the declared ones, by channel."""
     fitting = []
-    for channel, ratio in (("psi", 1.0 / gain), ("r", gain)):
+    for channel, ratio in ratios.items():
         declared = locator.columns[channel].unit
         for unit in fitting_units(channel, declared, ratio, apart=math.log(2.0)):
             fitting.append((channel, unit))
@@ -116,18 +116,15 @@ def check_velocity(log: Log, frame: str, locator: Locator) -> None:
     """
     channels = log.channels
     velocity = channels["u"] + 1j * channels["v"]
-    heading = np.exp(1j * channels["psi"])
     position = channels["x"] + 1j * channels["y"]
-    over_ground = {"body": velocity * heading, "earth": velocity}
-    misfits, told = {}, {}
-    for name, one in over_ground.items():
-        sailed = integral(log.t, one)
-        _, moved, expected = changes(log.t, 10.0, position, sailed)
-        misfits[name] = np.linalg.norm(moved - expected)
-        told[name] = expected
-
-    declared = misfits.pop(frame)
-    ((other, misfit),) = misfits.items()
+    body = integral(log.t, velocity * np.exp(1j * channels["psi"]))
+    earth = integral(log.t, velocity)
+    _, moved, *sailed = changes(log.t, 10.0, position, body, earth)
+    told = dict(zip(("body", "earth"), sailed, strict=True))
+    expected = told.pop(frame)
+    ((other, in_other),) = told.items()
+    declared = np.linalg.norm(moved - expected)
+    misfit = np.linalg.norm(moved - in_other)
     usual = 0.2 * np.linalg.norm(moved)
     if declared > max(usual, 5.0 * misfit):
         u = locator.columns["u"].name
@@ -139,7 +136,7 @@ def check_velocity(log: Log, frame: str, locator: Locator) -> None:
             f' velocity_frame = "{other}"',
             [("velocity_frame", other)],
         )
-    _check_size(moved, told[frame], locator)
+    _check_size(moved, expected, locator)
 
 
 def _check_size(
@@ -171,12 +168,14 @@ _SLOWEST = 0.3  # m/s over ground, of any manoeuvre
 def check_over_ground(log: Log, conventions: Conventions, locator: Locator) -> None:
     """Refuse a ship at berth, and a heading that contradicts the course over ground.
 
-    The channels are as logged, in SI units, the heading without jumps.
+    The channels are as logged, in SI units, the heading without jumps. Positions in
+    metres may count from another axis than north: of them only the unit is judged.
     """
     north, east = log.ground_velocity
     speed = np.hypot(north, east)
     fastest = np.quantile(speed, 0.95)
-    if fastest < _SLOWEST:
+    is_compass = "lat" in locator.columns or log.has("ground_north")
+    if is_compass and fastest < _SLOWEST:
         raise InputError(
             f"{locator.path}: expected a manoeuvre, got a ship that makes at most"
             f" {fastest:.2g} m/s over ground: she is at berth or at anchor; read"
@@ -185,9 +184,11 @@ def check_over_ground(log: Log, conventions: Conventions, locator: Locator) -> N
     moving = speed > 0.3 * fastest  # a slow ship has no course
     if "psi" not in log.channels or np.count_nonzero(moving) < 3:
         return
-    is_known = bool(conventions.installation.heading_offset)
     psi = log.channels["psi"][moving]
     course = np.arctan2(east, north)[moving]
+    _check_heading_unit(log.t[moving], psi, np.unwrap(course), locator)
+    if not is_compass:
+        return
     apart = np.exp(1j * (course - psi))
     agreement = abs(apart.mean())
     both = np.exp(1j * (course + psi))
@@ -196,9 +197,25 @@ def check_over_ground(log: Log, conventions: Conventions, locator: Locator) -> N
     limit = max(0.95, agreement + 0.02)
     if is_turning and abs(mirrored) > limit:
         raise _mirrored(mirrored, conventions, locator)
-    fault = _heading_fault(psi, course, offset_is_known=is_known)
+    fault = _heading_fault(psi, course, conventions.installation.heading_offset)
     if fault:
         raise InputError(f"{locator.path}: expected a heading {fault}")
+
+
+def _check_heading_unit(
+    t: Floats, psi: Floats, course: Floats, locator: Locator
+) -> None:
+    """Refuse a heading that turns as the course over ground, but in another unit."""
+    gain = abs(turning_gain(t, psi, course))
+    proposals = _nearest_units(locator, psi=1.0 / gain)
+    declared = ("psi", locator.columns["psi"].unit)
+    if proposals and declared not in proposals:
+        raise InputError(
+            f"{locator.path}: expected a heading that turns with the course over"
+            f" ground, got one that turns {gain:.3g} times as fast; likely a wrong"
+            f" unit, declare {locator.declaration(*proposals[0])}",
+            proposals,
+        )
 
 
 def check_speed_units(log: Log, locator: Locator) -> None:
@@ -270,10 +287,10 @@ def _mirrored(
     )
 
 
-def _heading_fault(psi: Floats, course: Floats, *, offset_is_known: bool) -> str:
+def _heading_fault(psi: Floats, course: Floats, declared_offset: float) -> str:
     """Words for a heading that copies or is far from the course over ground.
 
-    Both are in rad, of shape (n_samples,). Empty for a sound one.
+    In rad, of shape (n_samples,). Empty for a sound one.
     """
     apart = np.exp(1j * (course - psi))
     mean = apart.mean()
@@ -284,7 +301,7 @@ def _heading_fault(psi: Floats, course: Floats, *, offset_is_known: bool) -> str
             f" than 0.3 deg of difference in a turn of {turned_deg:.0f} deg; name the"
             ' gyro\'s column: psi = { column = "..." }'
         )
-    if offset_is_known:
+    if declared_offset:
         return ""
     offset = _constant_offset(psi, np.angle(mean) + np.angle(apart / mean))
     largest_deg = 25.0
