@@ -43,8 +43,13 @@ def execute_time(trial: Trial) -> float:
         return float(t[first_held(trial)])
 
     move = np.abs(delta - delta[0])
-    reach = float(np.percentile(move, 75))
-    return max(departure(t, move, reach, _fastest_rate(t, delta)), float(t[0]))
+    left = departure(
+        t,
+        move,
+        float(np.percentile(move, 75)),
+        _fastest_rate(t, delta),
+    )
+    return max(left, float(t[0]))
 
 
 def reversals(trial: Trial) -> tuple[float, list[float]]:
@@ -58,7 +63,12 @@ def reversals(trial: Trial) -> tuple[float, list[float]]:
     start = execute_time(trial)
     ordered = is_ordered(trial)
     part = ORDERED if ordered else MEASURED
-    holds = _holds(t, delta, start, part * usual_rudder(trial))
+    holds = _holds(
+        t,
+        delta,
+        start,
+        part * usual_rudder(trial),
+    )
     if not ordered:
         return start, _departures(t, delta, holds)
     return start, t[[hold[0] for hold in holds[1:]]].tolist()
@@ -71,11 +81,22 @@ def _departures(t: Floats, delta: Floats, holds: list[Floats]) -> list[float]:
     for hold, after in pairwise(holds):
         moving = slice(hold[-1], after[0] + 1)
         move = np.abs(delta[moving] - np.median(delta[hold]))
-        times.append(departure(t[moving], move, float(move.max()), fastest))
+        time = departure(
+            t[moving],
+            move,
+            float(move.max()),
+            fastest,
+        )
+        times.append(time)
     return times
 
 
-def _holds(t: Floats, delta: Floats, start: float, least: float) -> list[Floats]:
+def _holds(
+    t: Floats,
+    delta: Floats,
+    start: float,
+    least: float,
+) -> list[Floats]:
     """Samples where the rudder starts to be held beyond an angle, side after side."""
     beyond = np.abs(delta) > least
     held = np.flatnonzero(beyond & (t >= start))

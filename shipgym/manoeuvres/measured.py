@@ -181,12 +181,22 @@ def smoothed(trial: Trial, period: float) -> tuple[Trial, dict[str, float]]:
     for name in ("psi", "x", "y"):
         if name not in trial:
             continue
-        smooth[name] = _low_pass(name, t, trial[name], period)
+        smooth[name] = _low_pass(
+            name,
+            t,
+            trial[name],
+            period,
+        )
         noise[name] = float(np.std(trial[name] - smooth[name]) / kept)
     return trial.with_channels(smooth), noise
 
 
-def _low_pass(name: str, t: Floats, values: Floats, period: float) -> Floats:
+def _low_pass(
+    name: str,
+    t: Floats,
+    values: Floats,
+    period: float,
+) -> Floats:
     """Smoothing spline along the first axis that halves motions of a period, s.
 
     The heading is continued before the start by its mirror image: a spline is straight
@@ -229,7 +239,10 @@ def _repetitions(smooth: Trial, noise: dict[str, float], period: float) -> list[
 
 
 def _unseen_error(
-    model: ShipModel, trial: Trial, noise: dict[str, float], rule: Rule
+    model: ShipModel,
+    trial: Trial,
+    noise: dict[str, float],
+    rule: Rule,
 ) -> float:
     """Error of an index that repeated noise does not show.
 

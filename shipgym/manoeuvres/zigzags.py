@@ -146,7 +146,10 @@ def zigzag_indices(
 
 
 def _initial_turning(
-    trial: Trial, start: float, threshold_deg: float, length: float
+    trial: Trial,
+    start: float,
+    threshold_deg: float,
+    length: float,
 ) -> float | None:
     """Lengths sailed from the first order to the heading threshold, if reached."""
     after = trial.t >= start
@@ -175,8 +178,11 @@ def switch_heading_deg(trial: Trial) -> float | None:
     turn = turns[0]
     change_deg = np.abs(_heading_change_deg(trial, start))
     before = float(change_deg[np.searchsorted(trial.t, turn) - 1])
-    times = [turn - 1.0, turn]
-    second_before, at = np.interp(times, trial.t, change_deg).tolist()
+    second_before, at = np.interp(
+        [turn - 1.0, turn],
+        trial.t,
+        change_deg,
+    ).tolist()
 
     rudder_deg = np.degrees(usual_rudder(trial))
     angles = [*range(90, 0, -5), 1]
@@ -212,7 +218,11 @@ def _heading_change_deg(trial: Trial, start: float) -> Floats:
 
 
 def _overshoot_deg(
-    trial: Trial, start: float, turn: float, end: float, switch: float
+    trial: Trial,
+    start: float,
+    turn: float,
+    end: float,
+    switch: float,
 ) -> float | None:
     """Heading beyond that of the reversal at time `turn`; None if growing at `end`."""
     is_after = (trial.t >= turn) & (trial.t <= end)
