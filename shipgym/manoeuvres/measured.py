@@ -86,8 +86,10 @@ def measured_in_file(model: ShipModel) -> list[tuple[str, MeasuredIndex]]:
     fitted = provenance.get("trials", [])
     if not isinstance(fitted, list):
         raise unexpected(place, "a list of tables", fitted)
-    tables = [check_table(trial, place) for trial in fitted]
-    trials = [check_text(trial.get("name"), f"{place} name") for trial in tables]
+    trials = [
+        check_text(check_table(trial, place).get("name"), f"{place} name")
+        for trial in fitted
+    ]
     where = f"{model.name}: provenance.measured"
     found = list[tuple[str, MeasuredIndex]]()
     for trial, indices in check_table(table, where, trials).items():
