@@ -37,6 +37,7 @@ FEWEST_TRIALS = 3  # to leave one out and learn something from it
 # structure's
 DEFAULT = 2.5
 DRAWS = 20  # of each model that a trial was left out of
+LEAST = 1e-3  # factor
 RUDDERS = 5  # with the noise of the logged one
 
 
@@ -72,8 +73,12 @@ def model_error(
 
 
 def _common(sizes: Mapping[str, float]) -> float:
-    """Root mean square of the factors by kind; 0 without any."""
-    return root_mean_square(np.array([*sizes.values()])) if sizes else 0.0
+    """Root mean square of the factors by kind; 0 without any.
+
+    A kind whose errors noise alone explains tells nothing of the equations.
+    """
+    told = [size for size in sizes.values() if size > LEAST]
+    return root_mean_square(np.array(told)) if told else 0.0
 
 
 def _generalisation(
@@ -142,8 +147,8 @@ def _smoothed(trial: Trial) -> Trial:
 def scale_of(errors: Sequence[PredictionError]) -> float:
     """Factor k at which errors are of size one.
 
-    There the mean of error^2 / (k^2 variance + noise^2) is 1. It is between a
-    thousandth and a thousand.
+    There the mean of error^2 / (k^2 variance + noise^2) is 1. It is between `LEAST`,
+    where noise alone explains them, and a thousand.
     """
     square, variance, noise = np.array(errors).T
 
@@ -151,10 +156,10 @@ def scale_of(errors: Sequence[PredictionError]) -> float:
         expected = np.exp(2.0 * log_factor) * variance + noise
         return float(np.mean(square / expected)) - 1.0
 
-    least = np.log(1e-3)
+    least = np.log(LEAST)
     largest = np.log(1e3)
     if excess(least) <= 0.0:
-        return 1e-3
+        return LEAST
     if excess(largest) >= 0.0:
         return 1e3
     return float(np.exp(brentq(excess, least, largest)))
