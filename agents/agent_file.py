@@ -59,7 +59,7 @@ def load_agent(path: str | Path, model: ShipModel | str | Path | None = None) ->
             agent = read_controller(content, str(path))
 
     if model is not None:
-        ship = model if isinstance(model, ShipModel) else load_model(model)
+        ship = load_model(model)
         agent.check_fits_model(ship)
     return agent
 

@@ -262,7 +262,10 @@ def check_flag(value: Any, where: str) -> bool:
 def check_finite(values: Any, where: str, hint: str = "") -> NDArray[np.float64]:
     """Return `values` as a read-only copy; they must be finite numbers."""
     try:
-        array = np.array(values, dtype=np.float64)
+        given = np.array(values)
+        array = given.astype(np.float64)
+        if given.dtype.kind in "USb":
+            raise TypeError
     except (TypeError, ValueError, OverflowError):
         raise unexpected(where, "an array of numbers", values) from None
     wrong = np.argwhere(~np.isfinite(array))

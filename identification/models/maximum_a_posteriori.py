@@ -117,7 +117,7 @@ def mmg_prior(source: str | ShipModel, particulars: Particulars) -> MMGPrior:
 
 def _in_mmg_form(source: str | ShipModel) -> ShipModel:
     """The reference ship named; InputError for one that is not of the MMG form."""
-    model = source if isinstance(source, ShipModel) else load_model(source)
+    model = load_model(source)
     if model.structure not in ("kvlcc2", MMG):
         raise InputError(
             "prior: expected a ship in the MMG form, 'kvlcc2', 'kvlcc2-l7' or a model"

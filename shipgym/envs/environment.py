@@ -6,6 +6,8 @@ import copy
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
+from enum import Enum
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -54,14 +56,7 @@ def read_options(
     randomisation, own = Randomisation.take_from(options)
     known = (*taken, *Randomisation.names())
     chosen = Task.of(task, known, **own)
-    if isinstance(model, Mapping):  # of a spec that was written as JSON
-        model = ShipModel.from_dict(model)
-    elif not isinstance(model, str | Path | ShipModel):
-        raise unexpected(
-            "model", "a name, the path of a model file, or a ShipModel", model
-        )
-    ship = model if isinstance(model, ShipModel) else load_model(model)
-    return ship, chosen, randomisation
+    return load_model(model), chosen, randomisation
 
 
 def spaces(task: Task, model: ShipModel, frame_stack: int = 1) -> tuple[Any, Space]:
@@ -112,6 +107,8 @@ def _content(value: Any) -> Any:
     """Content of a keyword that is an object; InputError if JSON cannot hold it."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
+    if isinstance(value, Enum):
+        return value.value
     if not hasattr(value, "to_dict"):
         expected = "keywords that JSON can hold, models and weather"
         raise unexpected("spec", expected, value, "give its name or path")
@@ -168,16 +165,18 @@ class ShipsEnv:
                 " has one with roll=True"
             )
         num_envs = given.get("num_envs", 1)
-        longest = given.get(LONGEST) or -1
-        if longest != -1:
-            longest = check_whole(longest, LONGEST, at_least=1)
+        longest = given.get(LONGEST)
+        if longest in (None, -1):  # -1: Gymnasium's word for none
+            longest = np.inf
+        else:
+            check_whole(longest, LONGEST, at_least=1)
         engine = Engine(
             self.model,
             num_envs,
             self.task,
             self.randomisation,
             allow_unstable=given["allow_unstable"],
-            cut_off=np.inf if longest == -1 else longest * self.pace.action_repeat,
+            cut_off=longest * self.pace.action_repeat,
         )
         self._artists: list[Artist] = []
         if mode is not None:
@@ -250,7 +249,7 @@ class ShipsEnv:
             given = {
                 one.name: getattr(spec, one.name) for one in fields(spec) if one.init
             }
-            steps = -(-self.task.episode_steps // self.pace.action_repeat)
+            steps = ceil(self.task.episode_steps / self.pace.action_repeat)
             longest = spec.kwargs.get(LONGEST) or -1
             given[LONGEST] = min(steps, longest) if longest > 0 else steps
             self._spec = ShipSpec(**given)

@@ -84,7 +84,7 @@ class Randomisation:
         """Load the ensemble; InputError for a model of another structure."""
         models = []
         for given in self.ensemble:
-            other = given if isinstance(given, ShipModel) else load_model(given)
+            other = load_model(given)
             if other.compiled is not model.compiled:
                 raise InputError(
                     f"ensemble: expected models of one structure, got {other.name!r},"

@@ -147,11 +147,12 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         if seed is not None or self._keys is None:
             self._keys = self._drawn_keys()
             episodes[:] = 0
-        self._begun = True
-        self._over = False
+        self._begun = False  # until the start is known to be one
         self._engine.begin(self._keys, episodes)
         if options and options.get("start"):
             start_lanes(self._engine, options["start"], self._engine.all_lanes)
+        self._begun = True
+        self._over = False
         self._draw()
         numbers = self._outcomes[ANSWER_OUTCOMES:].tolist()
         return self._seen(self._engine.all_lanes), self._info(numbers)

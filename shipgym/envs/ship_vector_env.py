@@ -129,11 +129,12 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         shown_before = engine.outputs
         engine.renew_outputs()
         engine.outputs.take(shown_before)  # of rows that go on
-        self._begun = True
+        self._begun = False  # until the starts are known to be some
         self._over = self._over & ~mask
         engine.begin(self._keys, episodes, mask)
         if options and options.get("start"):
             start_lanes(engine, options["start"], mask)
+        self._begun = True
         self._draw(mask)
         infos = self._infos(mask.copy())
         return self._shown(mask), infos

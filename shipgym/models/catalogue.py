@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from os.path import exists
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from shipgym.checks import check_choice
+from shipgym.checks import check_choice, unexpected
 from shipgym.errors import InputError
 from shipgym.models.ship_model import ShipModel
 from shipgym.ships.particulars import Particulars
@@ -158,13 +158,21 @@ def register_ship_equations(ship: ShipEquations | str | Path) -> ShipEquations:
     return new
 
 
-def load_model(name: str | Path) -> ShipModel:
+def load_model(name: Any) -> ShipModel:
     """Load a model by name, or from a file.
 
     A name of `list_models`, the path of a model file, or that of a Python file with the
-    equations of a ship (`register_ship_equations`), which is run. Raises InputError if
-    there is no such model or file, or the file is not a valid model.
+    equations of a ship (`register_ship_equations`), which is run; the content of a
+    model file; a model is returned as it is. Raises InputError if there is no such
+    model or file, or the file is not a valid model.
     """
+    if isinstance(name, ShipModel):
+        return name
+    if isinstance(name, Mapping):
+        return ShipModel.from_dict(name)
+    if not isinstance(name, str | Path):
+        expected = "a name, the path of a model file, or a ShipModel"
+        raise unexpected("model", expected, name)
     path = Path(name)
     if path.suffix == ".py":
         return model_of(register_ship_equations(path))
@@ -198,7 +206,7 @@ def grey_box(
     from shipgym.ships.grey_boxes import SOURCE, GreyBox
     from shipgym.ships.terms import read_terms
 
-    ship = reference if isinstance(reference, ShipModel) else load_model(reference)
+    ship = load_model(reference)
     # terms of Mei, Sun & Shi 2019 in each equation
     given = equations or dict.fromkeys("uvr", "du, v, r, delta, 1")
     table = {equation: read_terms(terms) for equation, terms in given.items()}

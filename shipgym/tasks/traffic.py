@@ -199,10 +199,10 @@ def vessel(source: Any, steps: int = 2) -> Callable[..., Motion]:
     InputError
         For a model whose forces are a sum over a table, which no task can name.
     """
-    from shipgym.models import ShipModel, load_model
+    from shipgym.models import load_model
     from shipgym.ships.manoeuvring_model import ship_of
 
-    model = source if isinstance(source, ShipModel) else load_model(source)
+    model = load_model(source)
     if model.compiled.staged:
         raise InputError(
             f"vessel: expected a ship with equations or a table of terms, got"

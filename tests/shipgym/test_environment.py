@@ -9,6 +9,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
+from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import RecordEpisodeStatistics, TimeAwareObservation
 from gymnasium.wrappers.vector import RecordEpisodeStatistics as VectorStatistics
 from stable_baselines3.common.monitor import Monitor
@@ -59,6 +60,24 @@ def same(first, second):
     for a, b in zip(first, second, strict=True):
         for left, right in zip(a, b, strict=True):
             np.testing.assert_array_equal(left, right)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"episode_steps": np.int64(20)},
+        {"action_repeat": np.int64(2)},
+        {
+            "ensemble": load_model("mariner-tls-svm").sample(2, 0),
+            "model": "mariner-tls-svm",
+        },
+        {"autoreset_mode": AutoresetMode.SAME_STEP},
+    ],
+)
+def test_a_spec_travels_as_json(options):
+    env = many(COURSE, **options)
+    again = gymnasium.make_vec(EnvSpec.from_json(env.spec.to_json()))
+    np.testing.assert_array_equal(again.reset(seed=3)[0], env.reset(seed=3)[0])
 
 
 @pytest.mark.parametrize(
@@ -196,6 +215,11 @@ def test_an_episode_starts_as_asked():
     ):
         with pytest.raises(InputError, match=message):
             env.reset(options={"start": asked})
+        with pytest.raises(InputError, match="no episode has begun"):
+            env.step(action[0])
+    for no_number in ("0.1", True):
+        with pytest.raises(InputError, match="rudder: expected an array of numbers"):
+            rows.reset(options={"start": {"rudder": no_number}})
 
 
 def test_the_largest_number_of_steps_means_the_same_for_one_and_many():
@@ -209,6 +233,8 @@ def test_the_largest_number_of_steps_means_the_same_for_one_and_many():
         *_, truncated, _ = env.step(action[0])
         assert truncated == rows.step(action)[3][0] == (step == 6)
     assert gymnasium.make_vec(rows.spec).num_envs == 3
+    with pytest.raises(InputError, match="max_episode_steps: expected an integer"):
+        many(COURSE, max_episode_steps=0)
 
 
 def test_a_spec_with_a_model_and_weather_at_hand_travels_as_json():
