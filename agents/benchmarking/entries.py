@@ -35,7 +35,7 @@ import numpy as np
 
 from agents.agent_file import PRETRAINED, load_agent
 from agents.controllers.controller import Controller
-from agents.controllers.designs import design, tuned, tuned_runs
+from agents.controllers.designs import design, tuned_runs
 from agents.controllers.interface import Policy, check_fits, model_hash
 from agents.controllers.learning_rules import LEARNING_RULES
 from agents.controllers.registry import (
@@ -265,7 +265,7 @@ def _policies(source: Any, task: BenchmarkTask, runs: int) -> list[Policy]:
     if source.startswith(TUNED):
         kind = _kind(source.removeprefix(TUNED), task)
         found = tuned_runs(kind, task, task.suite)[:runs]
-        return [tuned(kind, task, task.suite, run) for run in range(len(found))]
+        return [design(kind, task, run["settings"]) for run in found]
 
     files = source_files(source, task)
     if not files:

@@ -190,19 +190,16 @@ class Controller(Fitting):
         """
         if not np.any(self.gains.get("wave_period", 0.0)):
             return replace(self, margins=self.margins_on(model))
-        failure = None
         for corner in CORNERS:
             made = replace(self, gains={**self.gains, "wave_corner": corner})
             try:
                 made = replace(made, margins=made.margins_on(model))
-            except InputError as error:
-                failure = error
+            except InputError:
+                if corner == CORNERS[-1]:
+                    raise
                 continue
-            failure = None
             if made.margins.is_enough:
                 break
-        if failure is not None:
-            raise failure
         return made
 
     @property

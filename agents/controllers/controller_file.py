@@ -60,9 +60,9 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
     check_names(names, design.observes + more, f"{where}: observation_names")
 
     gain_names = design.gain_names or (*design.feedback, *HELM)
-    gains = {name: Bounds(*HELM.get(name, ANY_NUMBER)) for name in gain_names}
+    usual = {name: Bounds(*HELM.get(name, ANY_NUMBER)) for name in gain_names}
+    gains = {name: design.bounds.get(name, one) for name, one in usual.items()}
     needed = {name: one for name, one in design.bounds.items() if name not in gains}
-    gains |= {name: one for name, one in design.bounds.items() if name in gains}
     rudder = Bounds(-np.pi, np.pi)  # rad
     with placed(where):
         check_table(content["gains"], "gains", gains)
@@ -128,13 +128,9 @@ def read_model(value: Any) -> dict[str, str]:
     """Name and hash of the model that an agent was made for, as its fields."""
     names = ("name", "sha256")
     table = check_table(value, "model", names)
-    texts = {}
-    for name in names:
-        texts[f"model_{name}"] = check_text(
-            table.get(name),
-            f"model.{name}",
-        )
-    return texts
+    return {
+        f"model_{name}": check_text(table.get(name), f"model.{name}") for name in names
+    }
 
 
 def read_names(value: Any) -> tuple[str, ...]:
@@ -149,10 +145,8 @@ def read_scales(value: Any, names: tuple[str, ...]) -> tuple[float, ...]:
     where = "observation_scales"
     check_array(value, (len(names),), where)
     bounds = Bounds(1e-9, 1e9)
-    scales = []
-    for name, one in zip(names, value, strict=True):
-        scales.append(_number(one, bounds, f"{where}: '{name}'"))
-    return tuple(scales)
+    named = zip(names, value, strict=True)
+    return tuple([_number(one, bounds, f"{where}: '{name}'") for name, one in named])
 
 
 def _number(value: Any, bounds: Bounds, where: str) -> float:
@@ -167,22 +161,18 @@ def _numbers(value: Any, needed: Mapping[str, Bounds], where: str) -> dict[str, 
             raise InputError(
                 f"{where}: expected {quoted(needed)}, got no '{name}'; {REMEDY}"
             )
-    numbers = {}
-    for name, value in table.items():
-        bounds = needed.get(name, FINITE)
-        numbers[name] = _number(value, bounds, f"{where}.{name}")
-    return numbers
+    return {
+        name: _number(number, needed.get(name, FINITE), f"{where}.{name}")
+        for name, number in table.items()
+    }
 
 
 def _margins(value: Any) -> Margins:
     """Margins; null is no limit."""
     names = [margin.name for margin in fields(Margins)]
     table = check_table(value, "margins", names, names)
-    limits = {}
-    for name, limit in table.items():
-        if limit is None:
-            limits[name] = np.inf
-            continue
-        place = f"margins.{name}"
-        limits[name] = _number(limit, FINITE, place)
+    limits = {
+        name: np.inf if limit is None else _number(limit, FINITE, f"margins.{name}")
+        for name, limit in table.items()
+    }
     return Margins(**limits)

@@ -44,10 +44,16 @@ def design(
     if not task.task.follows_path:
         raise no_path(kind, task)
 
-    own, of_autopilot = _divided(given)
+    own = {}
+    inner = {}
+    for name, value in given.items():
+        if name.startswith(INNER):
+            inner[name.removeprefix(INNER)] = value
+        else:
+            own[name] = value
     guide: Controller = made.from_model(
         task.ship,
-        autopilot=design("lq", task, of_autopilot),
+        autopilot=design("lq", task, inner),
         task=task.task,
         **own,
     )
@@ -67,18 +73,6 @@ def for_sea(made: Any, task: Task, interval: float) -> dict[str, float]:
     # a Kalman filter takes most of the waves out already
     filters = made.law is linear_law and made.settings_type is not None
     return {"wave_period": waves.peak_period} if filters else {}
-
-
-def _divided(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Settings of guidance and, by their own names, of the LQ that it leads."""
-    own = {}
-    inner = {}
-    for name, value in settings.items():
-        if name.startswith(INNER):
-            inner[name.removeprefix(INNER)] = value
-        else:
-            own[name] = value
-    return own, inner
 
 
 def tuned(kind: str, task: BenchmarkTask, suite: str, run: int = 0) -> Controller:

@@ -7,7 +7,7 @@ the autopilot. A guidance law is a law (`agents.controllers.law`) that reads
 the ship, rad.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self
@@ -159,7 +159,7 @@ class Guided(Controller):
 
         own: Any = cls.settings_type(**settings)
         own = own.completed(model, asked, pilot)
-        names = cls.observed_in(asked, model)
+        scales = cls.observed_in(asked, model)
         gains = own.gains(model, asked, pilot)
         task_lookahead = asked.lookahead * model.particulars["length"]
         design_model = {"ship": model} if cls.has_ship else {}
@@ -168,8 +168,8 @@ class Guided(Controller):
             neutral_rudder=pilot.neutral_rudder,
             neutral_sway=pilot.neutral_sway,
             margins=pilot.margins,
-            observation_scales=_scales_of(asked, model, names),
-            observation_names=names,
+            observation_scales=tuple(scales.values()),
+            observation_names=tuple(scales),
             model_name=pilot.model_name,
             model_sha256=pilot.model_sha256,
             design={"dt": dt, **own.design(model, asked)},
@@ -187,13 +187,19 @@ class Guided(Controller):
             )
 
     @classmethod
-    def observed_in(cls, task: Task, model: ShipModel) -> tuple[str, ...]:
-        """Names of what it observes in a task."""
-        shown = [quantity.name for quantity in task.observed(model)]
-        n = len(cls.observes)
-        following = tuple(shown[n : n + len(cls.may_observe)])
-        has_more = following == cls.may_observe
-        return cls.observes + cls.may_observe if has_more else cls.observes
+    def observed_in(cls, task: Task, model: ShipModel) -> dict[str, float]:
+        """Scales of what it observes; InputError for what a task does not show."""
+        shown = {quantity.name: quantity.scale for quantity in task.observed(model)}
+        names = cls.observes
+        following = tuple(shown)[len(names) : len(names) + len(cls.may_observe)]
+        if following == cls.may_observe:
+            names += following
+        for name in names:
+            if name not in shown:
+                raise InputError(
+                    f"task: expected one that shows '{name}', got '{task.name}'"
+                )
+        return {name: shown[name] for name in names}
 
     @classmethod
     def is_closed_form(cls) -> bool:
@@ -328,17 +334,6 @@ def with_path(task: Task | None) -> Task:
     if not task.follows_path:
         raise InputError(f"task: expected one with a path, got '{task.name}'")
     return task
-
-
-def _scales_of(task: Task, model: ShipModel, names: Sequence[str]) -> tuple[float, ...]:
-    """Scales of observations of a task; InputError for one that it does not show."""
-    scales = {quantity.name: quantity.scale for quantity in task.observed(model)}
-    for name in names:
-        if name not in scales:
-            raise InputError(
-                f"task: expected one that shows '{name}', got '{task.name}'"
-            )
-    return tuple([scales[name] for name in names])
 
 
 def shown_course(seen: PathSignals, lookahead: float, path_radius: float) -> Number:

@@ -77,10 +77,7 @@ class Compensator(NamedTuple):
                 [self.B, self.A],
             ]
         )
-        feeds_order = self.D[:, INTEGRAL].any()
-        feeds_memory = self.B[:, INTEGRAL].any()
-        is_fed_back = feeds_order or feeds_memory
-        if is_fed_back:
+        if self.D[:, INTEGRAL].any() or self.B[:, INTEGRAL].any():
             return whole
         without = np.delete(whole, INTEGRAL, axis=0)
         return np.delete(without, INTEGRAL, axis=1)
@@ -90,7 +87,12 @@ class Compensator(NamedTuple):
 
         `name` is that of the design. Raises InputError if the closed loop is unstable.
         """
-        self._check_closed_loop(ship, name)
+        remedy = (
+            ": the closed loop is unstable with these gains; choose a shorter control"
+            " interval dt, and a lower frequency (PID) or a larger rate_weight_s2 (LQ)"
+            " in from_model"
+        )
+        check_stable(self.closed_loop(ship), name, remedy)
         omega = frequencies_of(ship)
         broken = self.responses(ship, omega)
         found = [crossings(omega, one) for one in broken.values()]
@@ -102,18 +104,6 @@ class Compensator(NamedTuple):
             delay_margin_s=least(delays),
             lowest_gain=float(np.max(at_order[at_order < 1.0], initial=0.0)),
         )
-
-    def _check_closed_loop(self, ship: SampledShip, name: str) -> None:
-        """Refuse gains with which a ship is unstable, with a remedy."""
-        matrix = self.closed_loop(ship)
-        pole = largest_pole(matrix)
-        if pole >= 1.0:
-            raise InputError(
-                f"{name}: expected sampled poles below 1, got {pole:.4f}: the closed"
-                " loop is unstable with these gains; choose a shorter control interval"
-                " dt, and a lower frequency (PID) or a larger rate_weight_s2 (LQ) in"
-                " from_model"
-            )
 
     def responses(self, ship: SampledShip, omega: Floats) -> dict[str, Complexes]:
         """Frequency responses of the broken loop, by the place where it is broken.
@@ -188,11 +178,13 @@ def largest_pole(matrix: Floats) -> float:
     return float(np.abs(np.linalg.eigvals(matrix)).max())
 
 
-def check_stable(matrix: Floats, where: str) -> None:
+def check_stable(matrix: Floats, where: str, remedy: str = "") -> None:
     """Refuse a sampled linear system that grows by itself with an InputError."""
     pole = largest_pole(matrix)
     if not pole < 1.0:
-        raise InputError(f"{where}: expected sampled poles below 1, got {pole:.4g}")
+        raise InputError(
+            f"{where}: expected sampled poles below 1, got {pole:.4f}{remedy}"
+        )
 
 
 def _transfer(A: Floats, B: Floats, z: Complexes) -> Complexes:

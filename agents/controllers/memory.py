@@ -9,7 +9,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from shipgym import InputError
 from shipgym.arrays import Flags, Floats
-from shipgym.engine.records import Record, field_types, is_record, is_table, leaves
+from shipgym.engine.records import (
+    Record,
+    is_array,
+    is_record,
+    is_table,
+    leaves,
+    members,
+)
 from shipgym.tasks.scales import OBSERVATION_NAMES
 
 
@@ -21,8 +28,8 @@ def size_of(record: Record) -> int:
 def from_columns(record: Record, columns: Iterator[Any]) -> Any:
     """Record of columns in the order of its fields; a table takes one for each row."""
     values: list[Any] = []
-    for kind in field_types(record).values():
-        if is_record(kind):
+    for _, kind in members(record):
+        if is_record(kind) or is_array(kind):
             value = from_columns(kind, columns)
         elif is_table(kind):
             rows = list(islice(columns, kind.rows))
@@ -30,7 +37,7 @@ def from_columns(record: Record, columns: Iterator[Any]) -> Any:
         else:
             value = next(columns)
         values.append(value)
-    return record(*values)
+    return record(*values) if is_record(record) else tuple(values)
 
 
 def to_rows(record: Any, n_ships: int) -> Floats:

@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from shipgym.engine.records import Record, is_record, members
+from agents.controllers.memory import from_columns
+from shipgym.engine.records import leaves
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.python_files import asked
@@ -54,10 +55,11 @@ class TaskRule:
 
     def _command(self, row: Any) -> Any:
         """Return the command for one ship, shape (n_commands,)."""
-        numbers = {}
+        record = self.task.definition.Observation
+        numbers = dict.fromkeys(leaves(record), 0.0)  # of those that are not shown
         for quantity, value in zip(self.shown, row, strict=True):
             numbers[quantity.path] = float(value) * quantity.scale
-        seen = _record_of(self.task.definition.Observation, numbers)
+        seen = from_columns(record, iter(numbers.values()))
         command = asked(self.rule, seen, self.ship, self.task.settings)
         numbers_of = np.atleast_1d(np.asarray(command, dtype=np.float64))
         if numbers_of.shape != (self.task.n_commands,):
@@ -66,15 +68,3 @@ class TaskRule:
                 f" {self.task.n_commands} numbers in [-1, 1], got {command!r}"
             )
         return numbers_of
-
-
-def _record_of(kind: Record, numbers: dict[str, float], prefix: str = "") -> Any:
-    """Record or array of numbers by their paths; those that are not shown are 0."""
-    parts = []
-    for name, part in members(kind):
-        path = prefix + name
-        if members(part):
-            parts.append(_record_of(part, numbers, f"{path}."))
-        else:
-            parts.append(numbers.get(path, 0.0))
-    return kind(*parts) if is_record(kind) else tuple(parts)
