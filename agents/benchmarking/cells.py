@@ -143,7 +143,10 @@ def read_cell(result: dict[str, Any]) -> Cell:
 def run_job(job: dict[str, Any]) -> dict[str, Any]:
     """Do a job of `job_of`, in any process; a `Cell` as a dict."""
     cell = run_cell(
-        Entry(job["entry"], job["source"]),
+        Entry(
+            job["entry"],
+            job["source"],
+        ),
         BenchmarkTask(**job["task"]),
         Options(**job["options"]),
     )

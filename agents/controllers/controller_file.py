@@ -145,8 +145,15 @@ def read_scales(value: Any, names: tuple[str, ...]) -> tuple[float, ...]:
     where = "observation_scales"
     check_array(value, (len(names),), where)
     bounds = Bounds(1e-9, 1e9)
-    named = zip(names, value, strict=True)
-    return tuple([_number(one, bounds, f"{where}: '{name}'") for name, one in named])
+    scales = [
+        _number(one, bounds, f"{where}: '{name}'")
+        for name, one in zip(
+            names,
+            value,
+            strict=True,
+        )
+    ]
+    return tuple(scales)
 
 
 def _number(value: Any, bounds: Bounds, where: str) -> float:

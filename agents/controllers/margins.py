@@ -96,7 +96,10 @@ class Compensator(NamedTuple):
         omega = frequencies_of(ship)
         broken = self.responses(ship, omega)
         found = [crossings(omega, one) for one in broken.values()]
-        gains, phases, delays = map(np.concatenate, zip(*found, strict=True))
+        gains, phases, delays = map(
+            np.concatenate,
+            zip(*found, strict=True),
+        )
         at_order, _, _ = found[0]
         return Margins(
             gain_margin=least(gains[gains > 1.0]),

@@ -49,7 +49,10 @@ class TaskRule:
         """Return the commands of the rule, as `Policy.predict` does; no memory."""
         observations = np.asarray(observation, dtype=np.float64)
         rows = np.atleast_2d(observations)
-        commands = np.array([self._command(row) for row in rows], dtype=np.float32)
+        commands = np.array(
+            [self._command(row) for row in rows],
+            dtype=np.float32,
+        )
         limited = np.clip(commands, -1.0, 1.0)
         return limited.reshape(*observations.shape[:-1], -1), state
 

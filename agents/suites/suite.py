@@ -187,7 +187,9 @@ def parse_suite(
 def _check_data(table: Mapping[str, Any], where: str) -> None:
     """Refuse a task that names code."""
     for name in ("environment", "rule"):
-        text = str(table.get(name, ""))
+        text = str(
+            table.get(name, ""),
+        )
         if ":" in text or text.endswith(".py"):
             raise InputError(
                 f"{where}.{name}: expected no code, got '{text}'; if you trust the"

@@ -122,7 +122,10 @@ def write_agents(result: AutopilotResult, folder: Path) -> None:
     if found is None:
         return
     result.model.save(folder / "model.json")
-    autopilots: list[Pilot | Track] = [*found.pilots, *found.tracks]
+    autopilots: list[Pilot | Track] = [
+        *found.pilots,
+        *found.tracks,
+    ]
     for autopilot in autopilots:
         key = autopilot.key
         if key not in found.refused:
