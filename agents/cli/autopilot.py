@@ -132,8 +132,10 @@ def _print_verification(
     say(*tables.criteria_notes(criteria))
     console.print(f"\nunstable draws: {int(verification.unstable.sum())} of {draws}\n")
     console.print(tables.ranking_table(result))
-    console.print()
+    say(f"indices and margins are {identification.model.steering.remark}", "")
     for name, track in result.metrics["tracks"].items():
+        if name in verification.refused:
+            continue
         console.print(
             f"{name.upper()} on the track: largest cross-track error"
             f" {track['cross_track_largest_m']:.1f} m, rms"

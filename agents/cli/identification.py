@@ -142,7 +142,12 @@ def advise_command(
         used = [trial for trial in result.trials if trial.use == "fit"]
         advice = advise(result.model, used, None, coefficient, number)
     answer(advice.to_dict())
-    say(str(advice), f"run next: {', then '.join(advice.chosen)}")
+    run_next = f"run next: {', then '.join(advice.chosen)}"
+    say(
+        str(advice),
+        f"{run_next}; it makes {advice.coefficient} certain, and `shipgym trials` names"
+        " the trials that decide criteria",
+    )
 
 
 @with_identify_options

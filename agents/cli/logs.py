@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -67,8 +66,8 @@ def new_ship_command(
     ship_file = render("shipgym.pages/ship.toml.jinja", **facts)
     write_text(ship_file, out)
 
-    read = [one.trial.notes for one in guessed if one.trial is not None]
-    notes = list(dict.fromkeys(chain.from_iterable(read)))
+    trials = [one.trial for one in guessed if one.trial is not None]
+    notes = list(dict.fromkeys(note for trial in trials for note in trial.notes))
     answer({"written": str(out), **_fields(guessed[0], facts), "notes": notes})
     summary = render("shipgym.pages/new_ship.txt.jinja", **facts)
     say(summary.strip())
@@ -92,14 +91,10 @@ def _check_again(path: Path) -> None:
 def _fields(first: TrialGuess, facts: dict[str, Any]) -> dict[str, Any]:
     """What was guessed, for a program that reads it."""
     side = facts["side"]
-    columns = {}
-    for one in first.columns:
-        columns[one.channel] = {
-            "column": one.name,
-            "unit": one.unit,
-        }
     return {
-        "columns": columns,
+        "columns": {
+            one.channel: {"column": one.name, "unit": one.unit} for one in first.columns
+        },
         "unused": first.unused,
         "rudder_positive": side.side if side else None,
         **{one.name: one.value for one in facts["conventions"]},
@@ -294,6 +289,12 @@ def look_command(
             warn(f"{trial.name}: {note.removeprefix(f'{trial.name}: ')}")
     for remark in remarks:
         warn(remark)
-    found = {"written": str(out), "verdict": headline, "trials": fields}
-    answer({**found, "to_decide": remarks})
+    answer(
+        {
+            "written": str(out),
+            "verdict": headline,
+            "trials": fields,
+            "to_decide": remarks,
+        }
+    )
     say(f"written: {out}")

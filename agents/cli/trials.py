@@ -48,6 +48,7 @@ def trials_command(
         write_page(ship, trials, out)
     answer({"model": ship.name, "seed": seed, **trials.to_dict()})
     _print_trials(trials, out)
+    say(f"indices are {ship.steering.remark}")
 
 
 def _print_trials(trials: StandardTrials, page: Path | None) -> None:

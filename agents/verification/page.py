@@ -48,6 +48,7 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
         length=float(result.ship.particulars.length),
         fit=fit_view(result.identification),
         found=found,
+        gear=result.model.steering,
         metrics=result.metrics,
         verdict=verdict,
         verdict_kind=kind,

@@ -10,6 +10,7 @@ import numpy as np
 from identification.judging.fit import Fit
 from shipgym import InputError
 from shipgym.models.linear import steering_state_space
+from shipgym.pages import number
 from shipgym.trials.navigation import set_and_drift
 
 
@@ -35,8 +36,8 @@ def error_source(provenance: Mapping[str, Any]) -> str:
     error = provenance.get("model_error")
     if error and error["factor"] > 1.0:
         source += (
-            f", and are multiplied by {error['factor']:.2g} because the equations are"
-            f" not quite the ship's ({error['how']})"
+            f", and are multiplied by {number(error['factor'], 2)} because the"
+            f" equations are not quite the ship's ({error['how']})"
         )
     return source
 
@@ -192,9 +193,9 @@ def _of_the_fit(fit: Fit) -> Iterator[str]:
     factor = found.get("model_error", {}).get("factor", 1.0)
     if "selection" in found and factor > 3.0:
         yield (
-            f"the best structure is wrong, too: its errors are {factor:.2g} times what"
-            " noise and the uncertainty of its coefficients explain; intervals are"
-            " widened by that, and hold less beyond the trials"
+            f"the best structure is wrong, too: its errors are {number(factor, 2)}"
+            " times what noise and the uncertainty of its coefficients explain;"
+            " intervals are widened by that, and hold less beyond the trials"
         )
 
 
@@ -263,7 +264,7 @@ def held_out_error(fit: Fit) -> str:
         )
     worst = max(errors, key=lambda name: errors[name])
     return (
-        f"Worst error on held-out trials: heading {errors[worst]:.2g} deg rms"
+        f"Worst error on held-out trials: heading {number(errors[worst], 2)} deg rms"
         f" ({PurePath(worst).name})."
     )
 

@@ -66,6 +66,16 @@ class SteeringGear:
         """Largest rudder rate, rad/s."""
         return math.radians(self.rudder_rate_deg_s)
 
+    @property
+    def remark(self) -> str:
+        """For which gear indices and margins hold, and what another one changes."""
+        return (
+            f"for a steering gear of {self.rudder_rate_deg_s:.3g} deg/s with a lag of"
+            f" {self.time_constant:.3g} s, as in [steering], without dead time: a dead"
+            " time adds about that time x yaw rate to an overshoot, and, as a longer"
+            " lag, costs margin"
+        )
+
     def frequency(self, step: float = 0.0) -> float:
         """Inverse of the time constant, 1/s, in steps of some seconds; 0 without lag.
 
