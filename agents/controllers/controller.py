@@ -32,7 +32,6 @@ from agents.controllers.memory import (
     from_columns,
     next_rows,
     recalled,
-    size_of,
     to_rows,
 )
 from agents.settings import Settings
@@ -220,7 +219,7 @@ class Controller(Fitting):
     @property
     def memory_size(self) -> int:
         """Count of the numbers that `predict` keeps of each ship in its state."""
-        return size_of(self.memory_record)
+        return len(leaves(self.memory_record))
 
     @property
     def memory_names(self) -> list[str]:

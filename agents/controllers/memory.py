@@ -14,15 +14,9 @@ from shipgym.engine.records import (
     is_array,
     is_record,
     is_table,
-    leaves,
     members,
 )
 from shipgym.tasks.scales import OBSERVATION_NAMES
-
-
-def size_of(record: Record) -> int:
-    """Return how many numbers a record has."""
-    return len(leaves(record))
 
 
 def from_columns(record: Record, columns: Iterator[Any]) -> Any:

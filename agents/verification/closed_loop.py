@@ -41,10 +41,8 @@ class ClosedLoop:
     @property
     def counted(self) -> Flags:
         """Models that count, shape (n_draws,)."""
-        counted = np.ones(len(self.draws), dtype=np.bool_)
-        for number, possible in self.possible.items():
-            counted[number] = possible
-        return counted
+        numbers = range(len(self.draws))
+        return np.array([self.possible.get(number, True) for number in numbers])
 
     def sail(self, autopilot: Controller) -> Episodes:
         """An episode of each model under a heading autopilot."""

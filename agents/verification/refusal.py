@@ -58,29 +58,27 @@ class Refusals(NamedTuple):
 
 def refused_designs(found: Verification, fit: Fit) -> Refusals:
     """The designs that may lose control, and the trial that would help most."""
-    lost = {}
-    for pilot in found.pilots:
-        why = lost_control(found, pilot.episodes) or lacking_margin(pilot.controller)
-        if why is not None:
-            lost[pilot.key] = why
-    tracks = {}
-    for track in found.tracks:
-        why = lost_track(track) or lacking_margin(track.controller)
-        if why is not None:
-            tracks[track.key] = why
-    refused = lost | tracks
+    pilots = {
+        one.key: lost_control(found, one.episodes) or lacking_margin(one.controller)
+        for one in found.pilots
+    }
+    tracks = {
+        one.key: lost_track(one) or lacking_margin(one.controller)
+        for one in found.tracks
+    }
+    refused = {key: why for key, why in (pilots | tracks).items() if why is not None}
     if not refused:
         return Refusals(refused)
     remedy = helpful_trial(fit)
-    if len(lost) < len(found.pilots):
+    if None in pilots.values():
         return Refusals(
             refused,
             run_next=remedy,
         )
 
-    for track in found.tracks:
-        refused[track.key] = "what steers on its course loses control"
-    names = ", ".join([key.upper() for key in lost])
+    for key in tracks:
+        refused[key] = "what steers on its course loses control"
+    names = ", ".join([key.upper() for key in pilots])
     return Refusals(
         refused,
         f"{names}: {refused[found.pilots[0].key]}; run {remedy}",

@@ -328,14 +328,11 @@ class TunedLSSVM(LinearRegressor):
             "value": search.value,
             "evaluations": search.evaluations,
         }
-        self._take(LSSVM(self.C_, "linear", self.scale, self.fit_intercept), X, y)
-        return self
-
-    def _take(self, own: LSSVM, X: ArrayLike, y: ArrayLike) -> None:
-        """Take what an estimator learns."""
+        own = LSSVM(self.C_, "linear", self.scale, self.fit_intercept)
         for name, value in vars(own.fit(X, y)).items():
             if name.endswith("_"):
                 setattr(self, name, value)
+        return self
 
     def error_weight(self) -> float:
         """Weight of the squared errors in the solution."""

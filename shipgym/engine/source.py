@@ -169,11 +169,9 @@ def annotated(record: Record, kind: type) -> Iterator[tuple[str, Any, Any]]:
     """Name, type and annotation, if any, of a kind of each field of a record."""
     field_type = field_types(record)
     for name, hint in field_types(record, notes=True).items():
-        found = None
-        for note in getattr(hint, "__metadata__", ()):
-            if isinstance(note, kind):
-                found = found or note
-        yield name, field_type[name], found
+        notes = getattr(hint, "__metadata__", ())
+        of_kind = (note for note in notes if isinstance(note, kind))
+        yield name, field_type[name], next(of_kind, None)
 
 
 def keywords(record: Record) -> Iterator[tuple[str, Any, Setting, Any]]:

@@ -43,7 +43,7 @@ class Envelope:
         high = samples.max(axis=0)
         width = np.maximum(high - low, 1e-6)
         scaled = (samples - low) / width
-        scaled_centre, quadratic = _ellipsoid_of(scaled.tobytes())
+        scaled_centre, quadratic = smallest_ellipsoid(scaled.tobytes())
 
         centre = low + scaled_centre * width
         factor = np.linalg.cholesky(quadratic).T / width
@@ -83,21 +83,15 @@ class Envelope:
 
 
 @lru_cache(maxsize=8)  # structures that are compared have the same trials
-def _ellipsoid_of(samples: bytes) -> tuple[Floats, Floats]:
-    """Smallest ellipsoid around samples, as their bytes."""
-    points = np.frombuffer(samples).reshape(-1, len(ENVELOPE_CHANNELS))
-    return smallest_ellipsoid(points)
+def smallest_ellipsoid(samples: bytes) -> tuple[Floats, Floats]:
+    """Ellipsoid of least volume around samples (Khachiyan; Todd & Yildirim 2007).
 
-
-def smallest_ellipsoid(points: Floats) -> tuple[Floats, Floats]:
-    """Ellipsoid of least volume around points (Khachiyan; Todd & Yildirim 2007).
-
-    The points, shape (n_points, n_dimensions), are scaled to ranges near 1; the
-    algorithm stops at a relative excess of 1e-3 of the largest distance. Returns
-    the centre c, shape (n_dimensions,), and the positive definite Q of (z - c)' Q (z -
-    c) <= 1.
+    The bytes are those of an array of shape (n_samples, 4), scaled to ranges near 1;
+    the algorithm stops at a relative excess of 1e-3 of the largest distance. Returns
+    the centre c, shape (4,), and the positive definite Q of (z - c)' Q (z - c) <= 1.
     """
-    d = points.shape[1]
+    d = len(ENVELOPE_CHANNELS)
+    points = np.frombuffer(samples).reshape(-1, d)
     floor = 1e-6 * np.eye(d)
     weights = _khachiyan_weights(points, floor)
     centre = weights @ points

@@ -106,8 +106,7 @@ class GreyBox(Structure):
             needed.add("phi")
         if self.shaft:
             needed.add("n")
-        in_order = [name for name in MEASURED if name in needed]
-        return tuple(in_order)
+        return tuple(name for name in MEASURED if name in needed)
 
     @property
     def has_rudder(self) -> bool:

@@ -27,7 +27,7 @@ def inertia(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
     p = model.particulars.completed()
     if isinstance(model.dynamics, Structure):
         prime = model.dynamics.prime_inertia(model.coefficients, p)
-        return _mass_unit(p) * _with_arms(prime, p)
+        return _in_si(prime, p)
     return particulars_inertia(p)
 
 
@@ -38,13 +38,13 @@ def _mass_unit(p: Particulars) -> float:
 
 def particulars_inertia(p: Particulars) -> Floats:
     """Mass and added mass by complete particulars, nothing in roll; as `inertia`."""
-    return _mass_unit(p) * _with_arms(prime_inertia(p), p)
+    return _in_si(prime_inertia(p), p)
 
 
-def _with_arms(prime: Floats, p: Particulars) -> Floats:
-    """Matrix of the prime system by its ship lengths, and nothing in roll."""
+def _in_si(prime: Floats, p: Particulars) -> Floats:
+    """Matrix of the prime system in SI units, and nothing in roll."""
     arms = np.array([1.0, 1.0, p.length])
-    return np.pad(prime * arms * arms[:, None], (0, 1))
+    return _mass_unit(p) * np.pad(prime * arms * arms[:, None], (0, 1))
 
 
 def _container(model: ManoeuvringModel) -> Floats:
@@ -71,7 +71,7 @@ def _mmg(model: ManoeuvringModel) -> Floats:
     derivatives = -slender * np.diag(added)
     problem = "added masses mx, my, Jz: expected a positive inertia, got none"
     prime = total_inertia(p, derivatives, problem)
-    return _mass_unit(p) * _with_arms(prime, p)
+    return _in_si(prime, p)
 
 
 def _tanker(model: ManoeuvringModel, water_depth: float) -> Floats:

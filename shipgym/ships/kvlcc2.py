@@ -25,8 +25,6 @@ YAW_GYRADIUS = 0.25  # by length
 class KVLCC2Equations(ShipEquations):
     """The standard method, its coefficients as published, the scale among them."""
 
-    scales = False
-
     @property
     def coefficients(self) -> dict[str, float]:
         """Those of the 7 m model."""

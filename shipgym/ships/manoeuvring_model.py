@@ -66,17 +66,17 @@ class ManoeuvringModel:
     def _checked_coefficients(self) -> dict[str, float]:
         """Coefficients as floats, in the order of the structure."""
         names = self.dynamics.coefficient_names
-        if self.coefficients.keys() != set(names):
-            raise _other_coefficients(
-                self.name,
-                names,
-                self.coefficients,
+        given = self.coefficients
+        if given.keys() != set(names):
+            missing = quoted(name for name in names if name not in given)
+            unknown = quoted(name for name in given if name not in names)
+            raise InputError(
+                f"coefficients of {self.name!r}: expected the {len(names)} of its"
+                f" structure; missing: {missing}; unknown: {unknown}"
             )
-        checked = {}
-        for name in names:
-            value = self.coefficients[name]
-            checked[name] = check_number(value, f"coefficients.{name}")
-        return checked
+        return {
+            name: check_number(given[name], f"coefficients.{name}") for name in names
+        }
 
     @property
     def table(self) -> Structure:
@@ -274,17 +274,6 @@ class ManoeuvringModel:
                 f"water_depth: expected more than the draught of {draught:g} m, got"
                 f" {water_depth:g} m"
             )
-
-
-def _other_coefficients(
-    model: str, names: tuple[str, ...], coefficients: Mapping[str, float]
-) -> InputError:
-    missing = quoted(name for name in names if name not in coefficients)
-    unknown = quoted(name for name in coefficients if name not in names)
-    return InputError(
-        f"coefficients of {model!r}: expected the {len(names)} of its structure;"
-        f" missing: {missing}; unknown: {unknown}"
-    )
 
 
 def _with_last_axis(argument: str, given: ArrayLike, names: tuple[str, ...]) -> Floats:

@@ -84,7 +84,12 @@ def accelerations_source(
     are divided by U, and the sum is multiplied by its power. `damped`: whether drift
     and turn die out where there is no equation of them; else their rate is 0.
     """
-    divided = prime and _has_negative_power(equations)
+    # where a term has more velocities than the sum that contains it
+    divided = prime and any(
+        speed_power(equation, term) < 0
+        for equation, terms in equations.items()
+        for term in terms
+    )
     rates = dict(DAMPED) if damped else {}
     needed: set[str] = set()
     first = 0
@@ -115,14 +120,6 @@ def _lines(
     sums = [f"{name}dot = {rates.get(name, '0.0')}" for name in MOTION_RATES]
     yaw = "rdot + motion.q" if memory else "rdot"
     return (*makings, *sums, f"return udot, vdot, {yaw}, pdot, qdot")
-
-
-def _has_negative_power(equations: Equations) -> bool:
-    """True where a term has more velocities than the sum that contains it."""
-    for equation, terms in equations.items():
-        if any(speed_power(equation, term) < 0 for term in terms):
-            return True
-    return False
 
 
 @cache

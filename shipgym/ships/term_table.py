@@ -257,17 +257,17 @@ class Structure:
 
     def term_scales(self, particulars: Particulars, shaft_speed: float = 0.0) -> Floats:
         """`feature_scale` of all terms, by equation; shape (n_coefficients,)."""
-        scales = []
-        for equation, terms in self.equations.items():
-            for term in terms:
-                scale = self.feature_scale(
-                    equation,
-                    term,
-                    length=particulars["length"],
-                    speed=particulars["speed"],
-                    shaft=shaft_speed,
-                )
-                scales.append(scale)
+        scales = [
+            self.feature_scale(
+                equation,
+                term,
+                length=particulars["length"],
+                speed=particulars["speed"],
+                shaft=shaft_speed,
+            )
+            for equation, terms in self.equations.items()
+            for term in terms
+        ]
         return np.array(scales)
 
     def acceleration_matrix(
@@ -385,14 +385,13 @@ def structure_fields(table: Mapping[str, Any], where: str) -> dict[str, Any]:
     place = f"{where}.equations"
     given = table.get("equations")
     lists = check_table(given, place, EQUATION_NAMES)
-    equations = {}
-    for equation, terms in lists.items():
-        equations[equation] = read_term_list(terms, f"{place}.{equation}")
-
     fields = {
         "name": table.get("name"),
         "source": table.get("source"),
-        "equations": equations,
+        "equations": {
+            equation: read_term_list(terms, f"{place}.{equation}")
+            for equation, terms in lists.items()
+        },
     }
     for key in ("normalisation", "quantity"):
         if key in table:

@@ -119,11 +119,7 @@ class Term:
 
 def symbols_in(tables: Iterable[tuple[Term, ...]]) -> set[str]:
     """Symbols that occur in any term of some equations."""
-    symbols: set[str] = set()
-    for terms in tables:
-        for term in terms:
-            symbols |= term.symbols
-    return symbols
+    return {symbol for terms in tables for term in terms for symbol in term.symbols}
 
 
 def read_terms(text: str) -> tuple[Term, ...]:
@@ -177,13 +173,9 @@ def short_terms(words: str, surge: str = "du") -> tuple[Term, ...]:
     symbols = {"u": surge, "d": "delta"}
     terms = []
     for word in words.split():
-        powers: Counter[str] = Counter()
         letters = re.findall(r"\|.\||.", word.lstrip("0"))
-        for letter in letters:
-            symbol = symbols.get(letter, letter)
-            powers[symbol] += 1
-        term = Term(word, tuple(powers.items()))
-        terms.append(term)
+        powers = Counter([symbols.get(letter, letter) for letter in letters])
+        terms.append(Term(word, tuple(powers.items())))
     return tuple(terms)
 
 
