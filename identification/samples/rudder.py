@@ -8,6 +8,7 @@ angle alone.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from scipy.special import lambertw
 from identification.samples.preprocess import is_noisy
 from shipgym import SteeringGear, Trial
 from shipgym.arrays import Flags, Floats, Integers
+from shipgym.trials.resampling import usual_step
 
 RAMP = 1e-4  # a rate within this part of the gear's rate is the gear's rate
 TOLERANCE = 1e-3  # of the rudder's range: orders closer than this are one order
@@ -340,7 +342,7 @@ def estimated_gear(trials: Sequence[Trial]) -> SteeringGear:
 
     The limit is 35 degrees or the largest angle recorded. Rate and lag are those that
     explain records without noise exactly; records with noise give the median rate of
-    the fast moves, and no lag.
+    the fast moves, and the lag with which these settle.
     """
     largest = max(np.abs(trial["delta"]).max() for trial in trials)
     largest_deg = float(np.degrees(largest))
@@ -357,7 +359,8 @@ def estimated_gear(trials: Sequence[Trial]) -> SteeringGear:
             axis=0,
         ).tolist()
     else:
-        rate, lag = _usual_rate(trials), 0.0
+        rate = _usual_rate(trials)
+        lag = _settling_lag(trials, rate)
     return SteeringGear(limit_deg, float(np.degrees(rate)), lag)
 
 
@@ -368,3 +371,54 @@ def _usual_rate(trials: Sequence[Trial]) -> float:
     )
     fastest = np.quantile(rates[rates > 0.0], 0.995)
     return float(np.median(rates[rates >= 0.5 * fastest]))
+
+
+def _settling_lag(trials: Sequence[Trial], rate: float) -> float:
+    """Lag of a gear of a rate, rad/s, by how its rudder settles in records with noise.
+
+    Where the rudder has slowed down to half the rate, half of rate times lag is left to
+    go. 0 where the median of that does not differ from what a gear without lag has to
+    go in its last sampling step, an eighth of a step on average.
+    """
+    left = list[float]()
+    step = 0.0
+    for trial in trials:
+        left += _left_to_go(
+            trial.t,
+            trial["delta"],
+            rate,
+        )
+        step = max(step, usual_step(trial.t))
+
+    fewest_moves = 6
+    if len(left) < fewest_moves:
+        return 0.0
+    low, middle, high = np.quantile(left, [0.25, 0.5, 0.75])
+    error = (high - low) / np.sqrt(len(left))
+    least = 0.125 * rate * step + 3.0 * error
+    if middle <= least:
+        return 0.0
+    return float(2.0 * middle / rate)
+
+
+def _left_to_go(
+    t: Floats,
+    delta: Floats,
+    rate: float,
+) -> list[float]:
+    """What moves of a rudder have left to go, rad, when they fall to half the rate.
+
+    Of moves that are followed by 4 s of rest, in the last half of which it has settled.
+    """
+    rates = np.diff(delta) / np.diff(t)
+    is_fast = np.abs(rates) >= 0.5 * rate
+    edges = np.flatnonzero(np.diff(is_fast, append=~is_fast[-1]))
+    left = []
+    for last, end in pairwise(edges):
+        begin = last + 1
+        rest = delta[begin : end + 2]
+        if is_fast[last] and t[end + 1] - t[begin] >= 4.0:
+            settled = np.median(rest[len(rest) // 2 :])
+            to_go = settled - rest[0]
+            left.append(float(np.sign(rates[last]) * to_go))
+    return left

@@ -26,11 +26,15 @@ GEARS = [(2.5, 0.0), (5.0, 0.0), (5.0, 0.4), (5.0, 1.0), (2.5, 2.5)]
 def test_rate_and_lag_of_the_gear_are_found_from_its_samples(
     mariner: ShipModel, rate: float, lag: float
 ) -> None:
-    _, coarse = fine_and_coarse(mariner, rate, lag)
+    fine, coarse = fine_and_coarse(mariner, rate, lag)
     gear = estimated_gear([coarse])
     assert gear.rudder_rate_deg_s == pytest.approx(rate, rel=1e-6)
     assert gear.time_constant == pytest.approx(lag, rel=1e-3, abs=1e-9)
     assert gear.rudder_limit_deg == 35.0
+    noise = np.random.default_rng(0).normal(0.0, 1e-3, len(fine))
+    noisy = fine.with_channels({q: fine[q] + noise for q in coarse.channels})
+    gear = estimated_gear([noisy.part(slice(k, None, 25)) for k in range(0, 25, 5)])
+    assert gear.time_constant == pytest.approx(lag, rel=0.25)
 
 
 @pytest.mark.parametrize(("rate", "lag"), GEARS)
