@@ -1,31 +1,25 @@
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from identification.samples.rudder import estimated_gear, rebuild
-from shipgym import ShipModel, SteeringGear, Trial
+from shipgym import SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
 
 
-def fine_and_coarse(model: ShipModel, rate: float, lag: float) -> tuple[Trial, Trial]:
+def fine_and_coarse(model, rate, lag):
     """A 15/15 zigzag with some steering gear, every 0.02 s and every 0.5 s of it."""
     geared = replace(model, steering=SteeringGear(40.0, rate, lag))
     fine = zigzag(geared, 15, 15, duration=300, dt=0.02)
-    return fine, Trial(
-        fine.t[::25], {name: fine[name][::25] for name in ("u", "v", "r", "delta")}
-    )
+    return fine, fine.part(slice(None, None, 25))
 
 
 GEARS = [(2.5, 0.0), (5.0, 0.0), (5.0, 0.4), (5.0, 1.0), (2.5, 2.5)]
 
 
 @pytest.mark.parametrize(("rate", "lag"), GEARS)
-def test_rate_and_lag_of_the_gear_are_found_from_its_samples(
-    mariner: ShipModel, rate: float, lag: float
-) -> None:
+def test_rate_and_lag_of_the_gear_are_found_from_its_samples(mariner, rate, lag):
     fine, coarse = fine_and_coarse(mariner, rate, lag)
     gear = estimated_gear([coarse])
     assert gear.rudder_rate_deg_s == pytest.approx(rate, rel=1e-6)
@@ -39,8 +33,8 @@ def test_rate_and_lag_of_the_gear_are_found_from_its_samples(
 
 @pytest.mark.parametrize(("rate", "lag"), GEARS)
 def test_rudder_between_samples_is_known_to_a_thousandth_of_a_degree(
-    mariner: ShipModel, rate: float, lag: float
-) -> None:
+    mariner, rate, lag
+):
     fine, coarse = fine_and_coarse(mariner, rate, lag)
     rebuilt = rebuild(coarse.t, coarse["delta"])
     assert rebuilt.gear is not None
@@ -51,8 +45,8 @@ def test_rudder_between_samples_is_known_to_a_thousandth_of_a_degree(
 
 
 def test_corners_are_at_the_switches_and_at_the_ends_of_the_ramps(
-    mariner: ShipModel,
-) -> None:
+    mariner,
+):
     fine, coarse = fine_and_coarse(mariner, 5.0, 1.0)
     switches = np.flatnonzero(np.diff(fine["delta_command"])) + 1
     rebuilt = rebuild(coarse.t, coarse["delta"])
@@ -63,7 +57,7 @@ def test_corners_are_at_the_switches_and_at_the_ends_of_the_ramps(
     assert np.all(np.abs(ends[-len(jumps) :] - jumps - 5.0) < 0.01)
 
 
-def test_rudder_that_no_gear_explains_is_taken_straight() -> None:
+def test_rudder_that_no_gear_explains_is_taken_straight():
     rng = np.random.default_rng(0)
     t = np.arange(200.0)
     delta = 0.1 * np.sin(t / 9.0) + 0.01 * rng.standard_normal(200)
@@ -72,7 +66,7 @@ def test_rudder_that_no_gear_explains_is_taken_straight() -> None:
     assert rebuilt(10.25) == pytest.approx(0.75 * delta[10] + 0.25 * delta[11])
 
 
-def test_limit_of_an_estimated_gear_is_the_largest_recorded_angle() -> None:
+def test_limit_of_an_estimated_gear_is_the_largest_recorded_angle():
     t = np.linspace(0.0, 40.0, 81)
     delta = np.radians(np.clip(4.0 * t, 0.0, 42.0))
     still = np.zeros_like(t)
