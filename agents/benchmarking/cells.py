@@ -67,15 +67,14 @@ class Cell:
         for on, figures in self.figures.items():
             n_runs, n_episodes = figures["cost"].shape
             seeds = judging_seeds(on, options.episodes, options.seed)
-            columns: dict[str, Any] = {
+            columns = {
                 "controller": controller,
                 "task": task,
                 "set": on,
                 "run": np.repeat(np.arange(n_runs), n_episodes),
                 "seed": np.tile(seeds, n_runs),
             }
-            for name, values in figures.items():
-                columns[name] = values.ravel()
+            columns |= {name: values.ravel() for name, values in figures.items()}
             tables.append(pd.DataFrame(columns))
         return pd.concat(
             tables,

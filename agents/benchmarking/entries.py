@@ -178,7 +178,7 @@ def read_entries(controllers: Any) -> tuple[Entry, ...]:
     if isinstance(controllers, Mapping):
         named = [(str(name), source) for name, source in controllers.items()]
 
-    entries: dict[str, Entry] = {}
+    entries = {}
     for name, source in named:
         if not name or name in entries:
             raise InputError(
@@ -204,7 +204,7 @@ def _named(given: Any) -> tuple[str, Any]:
         return name, source or name
     # an object is known by its name, a function by its own, others by their class
     kind = type(given).__name__
-    own: Any = getattr(given, "name", None)
+    own = getattr(given, "name", None)
     if not own:
         own = getattr(given, "__name__", kind)
     return str(own), given
@@ -278,10 +278,7 @@ def _runs(source: Any, task: BenchmarkTask, runs: int) -> list[Policy]:
     is_policy = hasattr(source, "predict")
     if is_policy or "seed" not in inspect.signature(source).parameters:
         return [_policy(source, task)]
-    policies = []
-    for seed in range(runs):
-        policies.append(_policy(partial(source, seed=seed), task))
-    return policies
+    return [_policy(partial(source, seed=seed), task) for seed in range(runs)]
 
 
 def _policy(source: Any, task: BenchmarkTask) -> Policy:

@@ -86,10 +86,8 @@ def _sweep_panel(result: BenchmarkResult, task: str) -> Panel:
     """The curves of one task."""
     about = result.summary["suite"]["tasks"][task]
     styles = line_styles(result.summary["controllers"])
-    sets = ["ship"]
-    for on in result.summary["tasks"][task]:
-        if on.startswith("sweep"):
-            sets.append(on)
+    swept = [on for on in result.summary["tasks"][task] if on.startswith("sweep")]
+    sets = ["ship", *swept]
 
     points = list(range(len(sets)))
     curves = []

@@ -86,4 +86,4 @@ def mean_score(
 def _score(cost: ArrayLike, rule_cost: ArrayLike) -> Floats:
     """Cost of the rule over that of a controller; NaN if both are 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.divide(rule_cost, cost))
+        return np.divide(rule_cost, cost)

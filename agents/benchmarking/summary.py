@@ -81,7 +81,7 @@ class Summary:
     def by_task(self) -> dict[str, dict[str, dict[str, Any]]]:
         """Return the figures of each controller in each set that it ran."""
         metrics = _metrics(self.episodes)
-        found: dict[str, dict[str, dict[str, Any]]] = {}
+        found = {}
         for task in self.tasks:
             sets: dict[str, dict[str, Any]] = {on: {} for on in task.sets}
             found[task.name] = sets
@@ -116,7 +116,7 @@ class Summary:
         on the ship; they are ordered by the geometric mean of their mean costs. A part
         of which not all tasks were run has no scores.
         """
-        rankings: dict[str, list[dict[str, Any]]] = {}
+        rankings = {}
         for task in self.tasks:
             if task.part not in rankings:
                 totals = [self._total(name, task.part, by_task) for name in self.names]

@@ -100,9 +100,9 @@ def check_observations(
 def check_episode(asking: "_Asking", ship: ShipModel, task: Task, n_steps: int) -> None:
     """Steer ships together and each alone, and begin another episode at the end."""
     engine = Engine(ship, N_SHIPS, task)
-    seen: Any = engine.reset(np.arange(N_SHIPS))
-    state: Any = None
-    alone: list[Any] = [None] * N_SHIPS
+    seen = engine.reset(np.arange(N_SHIPS))
+    state = None
+    alone = [None] * N_SHIPS
     begins = np.ones(N_SHIPS, dtype=np.bool_)
     for step in range(n_steps):
         starts = begins & (step == 0)

@@ -329,12 +329,14 @@ class Controller(Fitting):
     def signals(self, observations: Floats) -> Signals:
         """Signals by observations of shape (n_ships, n_observations), SI units."""
         known = self.observed(observations)
-        sine = known["heading_error_sin"]
-        cosine = known["heading_error_cos"]
+        error = np.arctan2(
+            known["heading_error_sin"],
+            known["heading_error_cos"],
+        )
         return Signals(
             sway=known["sway"],
             yaw_rate=known["yaw_rate"],
-            heading_error=np.arctan2(sine, cosine),
+            heading_error=error,
             rudder=known["rudder"],
             heading_error_integral=known["heading_error_integral"],
             surge=known["surge"],

@@ -292,15 +292,14 @@ class Guided(Controller):
         """Signals by observations of shape (n_ships, n_observations), SI units."""
         known = self.observed(observations)
         zero = np.zeros(len(observations))
-        sine = known["heading_error_sin"]
-        cosine = known["heading_error_cos"]
-        error = np.arctan2(sine, cosine)
-        course_error = zero
-        if "course_error_sin" in known:
-            sine = known["course_error_sin"]
-            cosine = known["course_error_cos"]
-            course_error = np.arctan2(sine, cosine)
-
+        error = np.arctan2(
+            known["heading_error_sin"],
+            known["heading_error_cos"],
+        )
+        course_error = np.arctan2(  # 0 where it is not shown
+            known.get("course_error_sin", zero),
+            known.get("course_error_cos", zero),
+        )
         turns = Turns(*[known.get(name, zero) for name in TURNS])
         seen = PathSignals(
             heading_error=error,

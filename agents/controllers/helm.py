@@ -105,7 +105,7 @@ def logged_noise(model: ShipModel) -> float:
 
 def logged(model: ShipModel, *place: str, at_most: float = 1e9) -> float:
     """Number in a model's provenance; 0 where there is none."""
-    found: Any = model.provenance or {}
+    found = model.provenance or {}
     where = f"model '{model.name}': provenance"
     for name in place:
         found = check_table(found, where).get(name) or {}

@@ -79,7 +79,7 @@ def kalman_gain(states: KalmanFilter, noise: float) -> tuple[Floats, Floats]:
     of_output = OUTPUT @ covariance
     innovation = of_output @ OUTPUT.T + of_noise
     solved = np.linalg.solve(innovation, of_output)
-    gain: Floats = solved.T
+    gain = solved.T
     variances = np.diag(innovation)
     deviations = np.sqrt(variances)
     return gain, deviations

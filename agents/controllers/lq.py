@@ -163,8 +163,7 @@ def lq_gain(ship: SampledShip, cost: SteeringCost, travel_time: float) -> Floats
     R = D.T @ D
     N = C.T @ D
     gain, _, _ = control.lqr(plant, Q, R, N)
-    row: Floats = np.ravel(gain)
-    return row
+    return np.ravel(gain)
 
 
 def cost_outputs(

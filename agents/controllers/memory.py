@@ -21,7 +21,7 @@ from shipgym.tasks.scales import OBSERVATION_NAMES
 
 def from_columns(record: Record, columns: Iterator[Any]) -> Any:
     """Record of columns in the order of its fields; a table takes one for each row."""
-    values: list[Any] = []
+    values = []
     for _, kind in members(record):
         if is_record(kind) or is_array(kind):
             value = from_columns(kind, columns)

@@ -304,7 +304,7 @@ class PreviewSettings(GuidanceSettings):
 
         Raises InputError for gains on heel where the task does not show it.
         """
-        own: Any = self
+        own = self
         dt = task.interval(model)
         inner = autopilot.gains
         length, speed = model.particulars["length"], model.particulars["speed"]

@@ -86,7 +86,7 @@ class WheelOverSettings(GuidanceSettings):
 
     def gains(self, model: ShipModel, task: Task, autopilot: Any) -> dict[str, float]:
         """Gains in SI units; of whole settings."""
-        own: Any = self
+        own = self
         length = model.particulars["length"]
         return {
             "lookahead": length * own.lookahead_lengths,

@@ -138,12 +138,11 @@ def _start(model: ShipModel) -> dict[str, float]:
 def _started(model: ShipModel, names: set[str], variables: Variables) -> Variables:
     """Variables of these names, with their values at the beginning."""
     start = _start(model)
-    started = {}
-    for name, variable in variables.items():
-        if name in names:
-            begin = start.get(name, 0.0)
-            started[name] = variable._replace(start=begin)
-    return started
+    return {
+        name: variable._replace(start=start.get(name, 0.0))
+        for name, variable in variables.items()
+        if name in names
+    }
 
 
 def coefficient_labels(model: ShipModel) -> dict[Record, Mapping[str, Label]]:

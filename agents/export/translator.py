@@ -186,15 +186,15 @@ class FunctionWriter:
     def _copy(self) -> Callable[..., Any]:
         """The function, with names for what it calls that write C."""
         function = self.function
-        names: dict[str, Any] = {
+        names = {
             "__name__": function.__module__,
             "min": partial(self._smaller, np.minimum),
             "max": partial(self._smaller, np.maximum),
             "int": partial(self.applied, int),
             "float": partial(self.applied, float),
         }
-        for name, value in named_globals(function, self.c.hooks):
-            names[name] = self.in_c(value)
+        used = named_globals(function, self.c.hooks)
+        names |= {name: self.in_c(value) for name, value in used}
         return FunctionType(
             function.__code__,
             names,

@@ -75,7 +75,7 @@ def _graph(policy: LearnedPolicy) -> tuple[str, dict[str, Any]]:
 def _network(network: Network, x: str) -> tuple[list[str], str, dict[str, Any]]:
     """Dense layers on `x`: their lines, the name of their output, their constants."""
     lines = []
-    constants: dict[str, Any] = {}
+    constants = {}
     last = len(network.layers) - 1
     for i, layer in enumerate(network.layers):
         constants[f"weight_{i}"] = layer.weight

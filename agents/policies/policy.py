@@ -258,7 +258,7 @@ class LearnedPolicy(Fitting):
         if self.action == "rudder-discrete":
             likeliest = output.argmax(axis=1, keepdims=True)
             return np.asarray(ORDERS[likeliest])
-        action: Action = np.clip(output, -1.0, 1.0)
+        action = np.clip(output, -1.0, 1.0)
         if proposed is not None:
             action = combined(proposed, action, float(self.authority))
         return action

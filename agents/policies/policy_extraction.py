@@ -160,7 +160,6 @@ def _environment(ships: Any) -> dict[str, Any]:
 
 def _options(keywords: Mapping[str, Any]) -> dict[str, Any]:
     """Keywords that say what is asked of the ships, as JSON has them."""
-    options = {}
     # Keywords of a vector environment that say how it runs, not what is asked.
     running = (
         "model",
@@ -170,11 +169,11 @@ def _options(keywords: Mapping[str, Any]) -> dict[str, Any]:
         "render_mode",
         *PACE,  # the policy's own
     )
-    for name, value in keywords.items():
-        is_of_package = name == "task" and value in TASKS
-        if name not in running and not is_of_package:
-            options[name] = as_json(value)
-    return options
+    return {
+        name: as_json(value)
+        for name, value in keywords.items()
+        if name not in running and not (name == "task" and value in TASKS)
+    }
 
 
 def _network(agent: Any) -> Network:

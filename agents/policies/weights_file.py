@@ -32,7 +32,7 @@ def write_policy(content: Mapping[str, Any], tensors: Tensors, path: Path) -> No
             f"{path}: expected a name that ends in .json; the weights are written"
             " next to it, in .safetensors"
         )
-    weights: bytes = save(tensors)
+    weights = save(tensors)
     sha256 = hashlib.sha256(weights).hexdigest()
     write_bytes(weights, weights_path(path))
     write_json({**content, "weights": {"sha256": sha256}}, path)

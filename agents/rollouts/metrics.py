@@ -192,13 +192,12 @@ def mean(run: Rollout, name: str) -> Floats:
 def root_mean_square(run: Rollout, name: str) -> Floats:
     """Root mean square over the intervals of each episode, shape (n,)."""
     squares = during(run, name) ** 2
-    root: Floats = np.sqrt(ratio(total(squares), run.steps))
-    return root
+    return np.sqrt(ratio(total(squares), run.steps))
 
 
 def total(values: Floats | Flags) -> Floats:
     """Sum over the first axis in its order, whatever the number of episodes."""
-    sums: Floats = np.cumsum(values, axis=0, dtype=np.float64)
+    sums = np.cumsum(values, axis=0, dtype=np.float64)
     return sums[-1] if len(sums) else np.zeros(values.shape[1:])
 
 

@@ -3,7 +3,6 @@
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -70,7 +69,7 @@ def _chart(runs: Mapping[str, Episode], trials: Mapping[str, Trial]) -> Figure:
         hull = _hull(run, 0.0)
         size = [0] * len(hull["x"])
         size[0] = 8  # the bow, where the ship is too small to be seen
-        ship: dict[str, Any] = {
+        ship = {
             **line(hull["x"], hull["y"], name, **styles[name]),
             "mode": "lines+markers",
             "marker": {"size": size},
@@ -96,9 +95,9 @@ def _with_slider(figure: Figure, times: Sequence[str]) -> Figure:
     """A figure with a slider over its frames, and a button that plays them."""
     still = {"mode": "immediate", "frame": {"duration": 0, "redraw": False}}
     playing = {"frame": {"duration": 50, "redraw": False}, "fromcurrent": True}
-    steps = []
-    for time in times:
-        steps.append({"label": time, "method": "animate", "args": [[time], still]})
+    steps = [
+        {"label": time, "method": "animate", "args": [[time], still]} for time in times
+    ]
     play = {"label": "Play", "method": "animate", "args": [None, playing]}
     figure.update_layout(
         sliders=[{"steps": steps, "currentvalue": {"prefix": "time, s: "}, "x": 0.1}],

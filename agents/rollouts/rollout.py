@@ -92,7 +92,7 @@ def rollout(
     sailing = starts = np.ones(n, dtype=np.bool_)
     ended = failed = np.zeros(n, dtype=np.bool_)
     costs = np.zeros(n)
-    sailed: list[Flags] = []
+    sailed = []
     while sailing.any():
         commands, missing = helmsman.steer(
             observations, starts, sailing, len(engine.command)

@@ -196,7 +196,7 @@ class BenchmarkTask:
     @property
     def files(self) -> list[Path]:
         """Files of the user's own that it names: tasks, models, rewards, sensors."""
-        named: list[Any] = [self.environment, self.model, self.true_ship]
+        named = [self.environment, self.model, self.true_ship]
         for options in (self.options, self.judge, *self.sweep):
             named += options.values()
         paths = [Path(name) for name in named if isinstance(name, str)]

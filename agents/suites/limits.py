@@ -30,10 +30,10 @@ def read_limits(value: Any, where: str) -> dict[str, float]:
     """
     table = check_table(value, where)
     check_keys(table, LIMITED_FIGURES, where)
-    limits = {}
-    for name, limit in table.items():
-        limits[name] = check_number(limit, f"{where}.{name}", at_least=0.0)
-    return limits
+    return {
+        name: check_number(limit, f"{where}.{name}", at_least=0.0)
+        for name, limit in table.items()
+    }
 
 
 def exceeded(

@@ -204,7 +204,7 @@ def _read_task(
     """Return a task from its table; relative paths in it begin at the folder."""
     field = f"{where}.environment"
     text = check_text(table.get("environment"), field)
-    given: dict[str, Any] = _resolved(table, folder)
+    given = _resolved(table, folder)
     options = dict(check_table(given.pop("options", {}), f"{where}.options"))
     if "sea" in given:
         options["sea"] = given.pop("sea")

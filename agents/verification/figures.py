@@ -135,8 +135,8 @@ def step_panels(
     shape (1 + n_draws, n_samples), rad, the identified model first; `step_deg`: the
     change of course, degrees.
     """
-    headings: list[Any] = []
-    rudders: list[Any] = []
+    headings = []
+    rudders = []
     for (name, response), colour in zip(responses.items(), PILOT_COLOURS, strict=False):
         heading, rudder = response
         headings += _step_lines(t, np.degrees(heading), name, colour)

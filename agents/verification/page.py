@@ -34,7 +34,7 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
     """
     verdict, kind = verdict_of(result)
     found = result.verification
-    data: dict[str, Any] = {}
+    data = {}
     if found is not None:
         length = float(result.model.particulars["length"])
         data = {
@@ -120,8 +120,8 @@ def headline(found: Verification) -> str:
 
 def _criteria_sentences(criteria: Mapping[str, Criterion]) -> list[str]:
     """The verdict on the IMO criteria, and those that are not decided."""
-    missed: list[str] = []
-    undecided: list[str] = []
+    missed = []
+    undecided = []
     for name, criterion in criteria.items():
         words = criterion_name(name, criterion).lower()
         if criterion.passed is False:

@@ -72,9 +72,10 @@ class Verification:
 
     def panels(self, length: float) -> dict[str, Panel]:
         """Panels of figures by name; `length`: of the ship, m."""
-        responses = {}
-        for pilot in self.by_name:
-            responses[pilot.name] = (pilot.step.heading, pilot.step.rudder)
+        responses = {
+            pilot.name: (pilot.step.heading, pilot.step.rudder)
+            for pilot in self.by_name
+        }
         heading, rudder = step_panels(
             self.pilots[0].step.t,
             responses,
@@ -136,7 +137,7 @@ class AutopilotResult:
     def metrics(self) -> dict[str, Any]:
         """The contents of metrics.json."""
         fit = self.identification
-        metrics: dict[str, Any] = {
+        metrics = {
             **fit.metrics,
             "stable": self.stable,
             "instability": self.instability,
