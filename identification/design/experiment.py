@@ -236,7 +236,7 @@ def _information(
     for q, rows in model.table.regression_rows.items():
         X = samples.features[q]
         of_terms[rows, rows] = X.T @ X / noise[q]
-    return np.asarray(matrix.T @ of_terms @ matrix)
+    return matrix.T @ of_terms @ matrix
 
 
 def _relative_errors(information: Floats, size: Floats) -> Floats:

@@ -129,7 +129,7 @@ def _relative_errors(estimator: TruncatedLSSVM, left: Floats) -> Floats:
     variance = left @ left / max(len(left) - estimator.rank_, 1)
     deviations = np.sqrt(variance * np.diag(estimator.inverse_moment_))
     with np.errstate(divide="ignore"):  # infinite for a coefficient of 0
-        return np.asarray(deviations / np.abs(estimator.coef_))
+        return deviations / np.abs(estimator.coef_)
 
 
 def backward_elimination(

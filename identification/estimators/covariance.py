@@ -82,7 +82,7 @@ def coefficient_covariance(
     which maps derivatives to those coefficients (`Structure.acceleration_matrix`).
     """
     half = np.linalg.solve(acceleration_matrix, acceleration_covariance)
-    covariance: Floats = np.linalg.solve(acceleration_matrix, half.T)
+    covariance = np.linalg.solve(acceleration_matrix, half.T)
     return 0.5 * (covariance + covariance.T)
 
 
@@ -92,7 +92,7 @@ def newey_west(scores: Floats, lags: int) -> Floats:
     By Newey & West 1987, with Bartlett's weights 1 - lag / (lags + 1).
     """
     most = min(lags, len(scores) - 1)
-    total: Floats = scores.T @ scores
+    total = scores.T @ scores
     for lag in range(1, most + 1):
         moment = scores[lag:].T @ scores[:-lag]
         total += (1.0 - lag / (most + 1.0)) * (moment + moment.T)

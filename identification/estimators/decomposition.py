@@ -74,14 +74,14 @@ class Decomposition(NamedTuple):
     def coefficients(self, filters: Floats) -> Floats:
         """Coefficients of the unscaled features, shape (n_features,)."""
         of_scaled = self.directions.T @ (filters * self.projections)
-        return np.asarray(of_scaled / self.scale)
+        return of_scaled / self.scale
 
     def inverse_moment(self, filters: Floats) -> Floats:
         """Regularised inverse of X'X (X centred), shape (n_features, n_features)."""
         used = filters > 0.0
         inverse = filters[used] / self.singular_values[used]
         unscaled = self.directions[used] / self.scale
-        return np.asarray((unscaled.T * inverse) @ unscaled)
+        return (unscaled.T * inverse) @ unscaled
 
 
 def decompose(

@@ -34,7 +34,7 @@ class Estimator(Protocol):
 
 def weights(estimator: Estimator, features: Floats) -> Floats:
     """Weight of each sample, shape (n_samples,), 1 where the estimator knows none."""
-    given: Floats | None = getattr(estimator, "weights_", None)
+    given = getattr(estimator, "weights_", None)
     return np.ones(len(features)) if given is None else given
 
 

@@ -96,7 +96,7 @@ def _allowed_growth(full: int, freedom: int) -> Floats:
         freedom,
         1.0 - significance,
     )
-    return np.asarray(1.0 + dropped / freedom * quantile)
+    return 1.0 + dropped / freedom * quantile
 
 
 @dataclass(eq=False, repr=False)

@@ -273,7 +273,7 @@ class Recursion(LinearRegressor):
         )
         # a sample is seen again while it is among the last
         times_seen = np.minimum(self.innovations, age + 1.0)
-        return np.asarray(times_seen * self.forgetting**age)
+        return times_seen * self.forgetting**age
 
     @abstractmethod
     def _advance(self, phi: Floats, y: Floats, start: _Start, history: Floats) -> None:

@@ -101,7 +101,7 @@ def correlation_matrix(scaled: Floats) -> Floats:
 
     Shape (n_terms, n_terms).
     """
-    return np.asarray(scaled.T @ scaled / len(scaled))
+    return scaled.T @ scaled / len(scaled)
 
 
 def variance_inflation(scaled: Floats) -> Floats:

@@ -252,7 +252,7 @@ def _with_noisy_rudder(own: ShipModel, trial: Trial) -> list[Trial]:
 def _robust_variance(scatter: Floats) -> Floats:
     """Variance along the first axis from the median of the squares."""
     of_normal = 0.455  # median of the square of a standard normal number
-    return np.asarray(np.median(scatter**2, axis=0) / of_normal)
+    return np.median(scatter**2, axis=0) / of_normal
 
 
 def index_errors(

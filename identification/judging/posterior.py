@@ -284,9 +284,9 @@ def coarsened(
     last report is returned too.
     """
     of_parts = posterior.trials.of_trials
-    error: dict[str, Any] = {}
+    error = {}
     slope = 0.5  # of the factor by the power, logarithms: of normal distributions
-    earlier: tuple[float, float] | None = None
+    earlier = None
     for _ in range(3):
         own = posterior.mode(start)
         left_out = []
@@ -295,7 +295,7 @@ def coarsened(
             mode = posterior.mode(own.point, others)
             left_out.append(posterior.model(mode))
         error = model_error(posterior.model(own), left_out, trials)
-        factor: float = error["factor"]
+        factor = error["factor"]
         near_enough = 1.1
         if factor <= near_enough:
             break
@@ -315,7 +315,7 @@ def _chains(posterior: CoarsenedPosterior, start: Floats, asked: Uncertainty) ->
 
     def points(coordinates: Floats) -> Floats:
         """Of nearly standard normal coordinates."""
-        return np.asarray(mode.point + coordinates @ axes.T)
+        return mode.point + coordinates @ axes.T
 
     def log_density(coordinates: Floats) -> Floats:
         return posterior.log_density(points(coordinates))
@@ -358,4 +358,4 @@ def _walkers(
     order = np.argsort(log_weights + rng.gumbel(size=len(points)))
     chosen = points[order[-n_walkers:]]
     chosen[~np.isfinite(log_density(chosen))] *= 0.01
-    return np.asarray(chosen)
+    return chosen

@@ -153,7 +153,7 @@ def _errors(
     model: ShipModel, trial: Trial, prediction: Trial | None
 ) -> dict[str, float | None]:
     """Root mean square errors by channel; None for one not known or not predicted."""
-    errors: dict[str, float | None] = dict.fromkeys(COMPARED)
+    errors = dict.fromkeys(COMPARED)
     if prediction is None:
         return errors
     for name in predicted_channels(model):

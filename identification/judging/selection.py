@@ -74,7 +74,7 @@ def rank_by_likelihood(structure: str, method: str, fit: Any) -> RankedFit:
     if largest.size:
         groups.append(largest)
     windy = any("wind_rdot" in trial for trial in trials)
-    of_pieces: list[float] = []
+    of_pieces = []
     sizes: dict[str, list[float]] = {}
     headings = []
     ran_away = 0

@@ -185,7 +185,7 @@ def report_page(fit: Fit) -> str:
     InputError if plotly is not installed.
     """
     instability = why_unstable(fit)
-    figures: dict[str, Any] = {"regression": regression_figure(fit)}
+    figures = {"regression": regression_figure(fit)}
     if instability is None:
         figures |= trial_figures(fit)
     return render(

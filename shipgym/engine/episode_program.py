@@ -1,12 +1,10 @@
 """Episodes compiled for a ship, a sea, a sensor set and a task."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
 
 from shipgym.engine import episodes, sailing, stages, tiles
-from shipgym.engine.annotations import ObservationSpec
 from shipgym.engine.compiled_ship import CompiledSea, CompiledShip
 from shipgym.engine.compiling import compiled, plain_python
 from shipgym.engine.envelope import Envelope
@@ -152,7 +150,7 @@ class EpisodeProgram:
     @cached_property
     def users_code(self) -> frozenset[Any]:
         """Functions of users that the loop is made of."""
-        found: set[Any] = set()
+        found = set()
         for function in self.hooks.values():
             if is_plain(function):
                 found |= users_functions(function, {})
@@ -185,7 +183,7 @@ class EpisodeProgram:
             "total_reward": summed(task.Reward),
             "store_observation": clipped_storer(
                 self.result_rows["observation"],
-                bounds_of(task.observations),
+                {path: (one.low, one.high) for path, one in task.observations.items()},
             ),
         }
 
@@ -197,13 +195,6 @@ class EpisodeProgram:
 
 
 episode_program = cache(EpisodeProgram)  # compiled once in a process
-
-
-def bounds_of(
-    specs: Mapping[str, ObservationSpec],
-) -> dict[str, tuple[float, float]]:
-    """Bounds of observations by their paths."""
-    return {path: (spec.low, spec.high) for path, spec in specs.items()}
 
 
 def _loaders(layout: Layout, lanes: int) -> dict[str, Any]:

@@ -50,7 +50,7 @@ def loader(rows: Rows, lanes: int = LANES) -> Function:
 
     With `lanes` 1 the array is a vector, and `lane` is not used and may be left out.
     """
-    names: dict[str, Any] = {}
+    names = {}
 
     def number(path: str, kind: Any) -> str:
         if is_table(kind):

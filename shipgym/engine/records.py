@@ -202,7 +202,7 @@ class Layout:
 
 def flat(record: Any) -> list[float]:
     """Numbers of a record or array and those within it, in order."""
-    numbers: list[float] = []
+    numbers = []
     for value in record:
         if isinstance(value, tuple):
             numbers += flat(value)

@@ -24,7 +24,7 @@ def refuse_foreign_random(function: FunctionType) -> None:
 
 def _refuse_in(code: CodeType, names: dict[str, Any]) -> None:
     """Look at each global that code names, and at attributes of it."""
-    value: Any = None
+    value = None
     for instruction in get_instructions(code):
         name = instruction.argval
         if instruction.opname == "LOAD_GLOBAL":

@@ -62,13 +62,14 @@ def formula_coefficients(ship: Particulars) -> dict[str, float]:
     `ship`: as `completed` gives it.
     """
     masses = added_mass(ship)
-    coefficients = dict.fromkeys(SHIP.coefficients, 0.0)
-    coefficients |= masses
-    coefficients |= yoshimura_hull(ship, masses["mx"], masses["my"])
-    coefficients |= _propeller(ship)
-    coefficients |= _rudder(ship)
-    coefficients["R_0"] = resistance(ship)
-    return coefficients
+    return {
+        **dict.fromkeys(SHIP.coefficients, 0.0),
+        **masses,
+        **yoshimura_hull(ship, masses["mx"], masses["my"]),
+        **_propeller(ship),
+        **_rudder(ship),
+        "R_0": resistance(ship),
+    }
 
 
 def yoshimura_hull(ship: Particulars, mx: float, my: float) -> dict[str, float]:

@@ -319,28 +319,26 @@ def check_units(
     model: ManoeuvringModel, orders: Floats, where: str = "commands"
 ) -> None:
     """Refuse orders, shape (n, n_command), not finite or not in rad and 1/s."""
-    names = model.command_names
     wrong = np.argwhere(~np.isfinite(orders))
     if len(wrong):
         row, column = wrong[0].tolist()
         raise InputError(
             f"{where}: row {row}: expected finite numbers, got {orders[row, column]}"
         )
-    if "delta" in names:
-        _check_within(
-            orders[:, names.index("delta")],
-            -np.pi / 2,
-            np.pi / 2,
-            "a rudder in rad (not degrees) between -pi/2 and pi/2",
-            where,
-        )
+    _check_within(
+        orders[:, 0],
+        -np.pi / 2,
+        np.pi / 2,
+        "a rudder in rad (not degrees) between -pi/2 and pi/2",
+        where,
+    )
     fastest_shaft = 5.0  # times the speed in service; beyond it the units are wrong
-    if "n" in names:
+    if "n" in model.command_names:
         service = model.service_shaft_speed
         most = fastest_shaft * service
         least = -most if model.dynamics.astern else 0.0
         _check_within(
-            orders[:, names.index("n")],
+            orders[:, 1],
             least,
             most,
             f"a shaft speed in 1/s (not rpm) between {least:.4g} and {most:.4g},"

@@ -458,7 +458,7 @@ def total_inertia(
         [0.0, m, m_xG],
         [0.0, m_xG, I_z],
     ]
-    total: Floats = np.array(rigid) - derivatives
+    total = np.array(rigid) - derivatives
     surge = total[0, 0]
     sway_and_yaw = total[1:, 1:]
     if surge <= 0.0 or np.linalg.det(sway_and_yaw) <= 0.0:

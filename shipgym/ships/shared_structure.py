@@ -124,7 +124,7 @@ class SharedStructure(Structure):
         inertia = self.prime_inertia(coefficients, p)
         forces = [self._velocity_forces(axis, coefficients, p) for axis in AXES]
         accelerations = self._from_forces(inertia) @ np.concatenate(forces)
-        return np.asarray(self.term_scales(p) * accelerations)
+        return self.term_scales(p) * accelerations
 
     def _velocity_forces(
         self, axis: str, coefficients: Mapping[str, float], p: Particulars

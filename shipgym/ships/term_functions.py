@@ -91,7 +91,7 @@ def accelerations_source(
         for term in terms
     )
     rates = dict(DAMPED) if damped else {}
-    needed: set[str] = set()
+    needed = set()
     first = 0
     for equation, terms in equations.items():
         monomials = []

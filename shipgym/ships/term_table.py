@@ -207,7 +207,7 @@ class Structure:
         shaft_speed: float,
     ) -> dict[str, Floats]:
         """Values of the speed `U` and of the terms' symbols at samples."""
-        values: dict[str, Floats] = {"U": np.hypot(channels["u"], channels["v"])}
+        values = {"U": np.hypot(channels["u"], channels["v"])}
         offsets = {"du": particulars["speed"], "dn": shaft_speed}
         for symbol in self.symbols:
             if symbol == "U":
@@ -444,7 +444,7 @@ def _check_terms(terms: tuple[Term, ...], normalisation: str, where: str) -> Non
         raise InputError(
             f"{where}: expected 1 to {MOST_TERMS} terms, got {len(terms) or 'none'}"
         )
-    seen: set[object] = set()
+    seen = set()
     for term in terms:
         term.check(where)
         if normalisation == "prime" and term.power("U"):
