@@ -10,10 +10,11 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.helm import CORNERS, HelmSettings, helm_of
+from agents.controllers.helm import CORNERS, HelmSettings, wave_filter
 from agents.controllers.interface import Fitting, model_hash
 from agents.controllers.law import (
     Gains,
+    Helm,
     HelmMemory,
     Law,
     LinearFeedback,
@@ -237,13 +238,26 @@ class Controller(Fitting):
         by_signal = dict.fromkeys(SIGNALS, 0.0)
         for gain, (signal, sign) in self.feedback.items():
             by_signal[signal] = sign * self.gains[gain]
+        gains = self.gains
+        helm = Helm(
+            wave=wave_filter(
+                gains["wave_period"],
+                gains["wave_corner"],
+                self.design["dt"],
+            ),
+            update=gains["rudder_update"],
+            band=gains["rudder_band"],
+            gear_share=gains["gear_share"],
+            gear_step=gains["gear_step"],
+            limit=self.rudder_limit,
+        )
         return LinearFeedback(
             gains=Gains(**by_signal),
             neutral_rudder=self.neutral_rudder,
             neutral_sway=self.neutral_sway,
             service_speed=self.service_speed,
-            schedule=self.gains["schedule"],
-            helm=helm_of(self.gains, self.design["dt"], self.rudder_limit),
+            schedule=gains["schedule"],
+            helm=helm,
         )
 
     @property

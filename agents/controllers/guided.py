@@ -313,8 +313,11 @@ class Guided(Controller):
             roll_rate=known.get("roll_rate", zero),
             turns=turns,
         )
+        # line of sight to the course of the path half of the lookahead ahead
         radius = self.gains.get("path_radius", 1.0)  # of no effect without turns
-        shown = shown_course(seen, self.gains["task_lookahead"], radius)
+        lookahead = self.gains["task_lookahead"]
+        ahead = bend(0.5 * lookahead, turns, radius)
+        shown = ahead - np.arctan2(seen.cross_track, lookahead)
         return seen._replace(heading_error=wrapped(error - shown))
 
     def loop(self) -> Compensator:
@@ -333,16 +336,6 @@ def with_path(task: Task | None) -> Task:
     if not task.follows_path:
         raise InputError(f"task: expected one with a path, got '{task.name}'")
     return task
-
-
-def shown_course(seen: PathSignals, lookahead: float, path_radius: float) -> Number:
-    """Course that the environment's heading error refers to, rad.
-
-    Line of sight with a lookahead, m, to the course of the path half of that ahead; 0
-    is the direction of the path beside the ship.
-    """
-    ahead = bend(0.5 * lookahead, seen.turns, path_radius)
-    return ahead - np.arctan2(seen.cross_track, lookahead)
 
 
 def bend(distance: float, turns: Turns, radius: float) -> Number:

@@ -4,13 +4,12 @@ Source: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 
 (low-pass and notch filters against waves), 13.2 (dead-band).
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from agents.controllers.law import Biquad, Helm
+from agents.controllers.law import Biquad
 from agents.settings import Settings, Step, setting
 from shipgym import ShipModel
 from shipgym.checks import check_number, check_table
@@ -117,18 +116,6 @@ def known(settings: Settings) -> dict[str, float]:
     """Settings by name, without those that have no value."""
     values = settings.to_dict()
     return {name: value for name, value in values.items() if value is not None}
-
-
-def helm_of(gains: Mapping[str, Any], dt: float, limit: float) -> Helm:
-    """Parameters of the helm by a controller's gains; `limit`: largest rudder, rad."""
-    return Helm(
-        wave=wave_filter(gains["wave_period"], gains["wave_corner"], dt),
-        update=gains["rudder_update"],
-        band=gains["rudder_band"],
-        gear_share=gains["gear_share"],
-        gear_step=gains["gear_step"],
-        limit=limit,
-    )
 
 
 def wave_filter(period: Any, share: Any, dt: float) -> Biquad:

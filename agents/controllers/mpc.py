@@ -85,7 +85,13 @@ class MPCSettings(WheelOverSettings):
     )
 
     def design(self, model: ShipModel, task: Task) -> dict[str, Any]:
-        """See `GuidanceSettings.design`, with the weights of the task."""
+        """See `GuidanceSettings.design`, with the weights of the task.
+
+        Of the rudder and of roll per rad^2, of the rudder rate per rad^2 in the time to
+        travel one ship length, of rudder travel per rad in a control interval. What the
+        task charges for reversals, grounding and extrapolation is left out.
+        """
+        travel_weight = getattr(task.settings, "rudder_travel_weight", 0.0)
         step = COARSE * task.interval(model)
         steps = round(self.horizon_lengths * model.travel_time / step)
         return {
@@ -93,7 +99,11 @@ class MPCSettings(WheelOverSettings):
             "horizon_steps": float(max(1, steps)),
             "deviation": float(np.radians(self.deviation_deg)),
             "water_depth": min(task.water_depth, DEEP),
-            **path_costs(task, model),
+            "corridor": task.corridor * model.particulars["length"],  # half its width
+            "rudder": task.rudder_weight / HEADING_SCALE**2,
+            "rudder_rate": task.rudder_rate_weight / HEADING_SCALE**2,
+            "rudder_travel": travel_weight / HEADING_SCALE,
+            "roll": task.roll_weight / float(np.radians(task.roll_scale_deg)) ** 2,
         }
 
 
@@ -242,23 +252,6 @@ def cheapest(plans: Floats, costs: Floats) -> Floats:
     order = np.argsort(costs, axis=1, kind="stable")
     elites = order[:, :ELITES, None]
     return np.take_along_axis(plans, elites, axis=1)
-
-
-def path_costs(task: Task, model: ShipModel) -> dict[str, float]:
-    """Half width of the corridor, m, and weights of the cost of a step in a task.
-
-    Of the rudder and of roll per rad^2, of the rudder rate per rad^2 in the time to
-    travel one ship length, of rudder travel per rad in a control interval. What the
-    task charges for reversals, grounding and extrapolation is left out.
-    """
-    travel_weight = getattr(task.settings, "rudder_travel_weight", 0.0)
-    return {
-        "corridor": task.corridor * model.particulars["length"],
-        "rudder": task.rudder_weight / HEADING_SCALE**2,
-        "rudder_rate": task.rudder_rate_weight / HEADING_SCALE**2,
-        "rudder_travel": travel_weight / HEADING_SCALE,
-        "roll": task.roll_weight / float(np.radians(task.roll_scale_deg)) ** 2,
-    }
 
 
 @lru_cache(maxsize=1)

@@ -85,16 +85,6 @@ class EpisodeProgram:
         """Rows of a tile of random numbers."""
         return Layout(random=Random, sea_random=SeaRandom)
 
-    @cached_property
-    def settings_rows(self) -> Layout:
-        """Rows of the settings of engine and sensor set."""
-        return Layout(rules=Rules, sensor_settings=self.sensors.Settings)
-
-    @cached_property
-    def task_settings_rows(self) -> Layout:
-        """Rows of the settings of the task."""
-        return Layout(task_settings=self.task.Settings)
-
     def row(self, name: str) -> int:
         """Row of a number of the state by its name: `u`, `course`, `steps`."""
         for record in ("motion", "commands", "counters", "task_state", "sea"):
@@ -120,6 +110,7 @@ class EpisodeProgram:
     def hooks(self) -> dict[str, Any]:
         """Functions and values for the hooks and constants of loops, by name."""
         of_ships = 1 if self.shared else LANES
+        settings = Layout(rules=Rules, sensor_settings=self.sensors.Settings)
         return {
             "GROUP": 1 if plain_python() else tiles.GROUP,
             "SHARED_SHIP": self.shared,
@@ -127,14 +118,14 @@ class EpisodeProgram:
             "MAY_FAIL": self.checked and self._may_fail,
             "PLAN_ROW": self.state_rows.n_rows,
             **_loaders(self.state_rows, LANES),
-            **_storers(self.state_rows, LANES),
+            **_storers(self.state_rows),
             **_loaders(self.result_rows, LANES),
-            **_storers(self.result_rows, LANES),
+            **_storers(self.result_rows),
             **_loaders(self.random_rows, LANES),
-            **_storers(self.random_rows, LANES),
+            **_storers(self.random_rows),
             **_loaders(self.ship_rows, of_ships),
-            **_loaders(self.settings_rows, 1),
-            **_loaders(self.task_settings_rows, 1),
+            **_loaders(settings, 1),
+            **_loaders(Layout(task_settings=self.task.Settings), 1),
             **_loaders(Layout(arguments=Arguments), 1),
             **self._task_hooks(),
             "measure": self.sensors.measure,
@@ -202,6 +193,6 @@ def _loaders(layout: Layout, lanes: int) -> dict[str, Any]:
     return {f"load_{name}": loader(rows, lanes) for name, rows in layout.rows.items()}
 
 
-def _storers(layout: Layout, lanes: int) -> dict[str, Any]:
+def _storers(layout: Layout) -> dict[str, Any]:
     """Functions that store the records of a layout, by the names of hooks."""
-    return {f"store_{name}": storer(rows, lanes) for name, rows in layout.rows.items()}
+    return {f"store_{name}": storer(rows) for name, rows in layout.rows.items()}

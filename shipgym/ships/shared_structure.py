@@ -56,7 +56,7 @@ class SharedStructure(Structure):
 
     Its `equations` are the terms that a simulation sums up: those of velocities of the
     shares, the same for sway and yaw, and the centripetal ones of the ship's own mass.
-    Make one by `shared_structure`.
+    Make one by `SharedStructure.of`.
     """
 
     # what makes up X (`u`), Y (`v`) and N (`r`), as `read_shares` reads it
@@ -169,32 +169,25 @@ class SharedStructure(Structure):
         given = check_table(table["shares"], place, allowed=AXES, required=AXES)
         texts = {axis: check_text(given[axis], f"{place}.{axis}") for axis in AXES}
         with placed(place):
-            return cls(**_fields(table.get("name"), table.get("source"), texts))
+            return cls.of(table.get("name"), table.get("source"), texts)
 
-
-def shared_structure(
-    name: str, source: str, texts: Mapping[str, str]
-) -> SharedStructure:
-    """Make a table for forces from the shares of equations `u`, `v` and `r`."""
-    return SharedStructure(**_fields(name, source, texts))
-
-
-def _fields(name: Any, source: Any, texts: Mapping[str, str]) -> dict[str, Any]:
-    """Fields of a `SharedStructure`: its equations follow from the shares."""
-    ahead, sway, yaw = (
-        [share.term for share in read_shares(texts[axis]) if not share.acceleration]
-        for axis in AXES
-    )
-    surge = _distinct([*ahead, VR, RR])
-    across = _distinct([*sway, *yaw, UR])
-    return {
-        "name": name,
-        "source": source,
-        "equations": {"u": surge, "v": across, "r": across},
-        "normalisation": "prime",
-        "quantity": "force",
-        "texts": dict(texts),
-    }
+    @classmethod
+    def of(cls, name: Any, source: Any, texts: Mapping[str, str]) -> Self:
+        """Make a table for forces from the shares of equations `u`, `v` and `r`."""
+        ahead, sway, yaw = (
+            [share.term for share in read_shares(texts[axis]) if not share.acceleration]
+            for axis in AXES
+        )
+        surge = _distinct([*ahead, VR, RR])
+        across = _distinct([*sway, *yaw, UR])
+        return cls(
+            name=name,
+            source=source,
+            equations={"u": surge, "v": across, "r": across},
+            normalisation="prime",
+            quantity="force",
+            texts=dict(texts),
+        )
 
 
 def _distinct(terms: Iterable[Term]) -> tuple[Term, ...]:

@@ -61,9 +61,9 @@ def printed_structure(name: str) -> Structure:
     tables = printed_tables()
     table = dict(tables[name])
     if "shares" in table:
-        from shipgym.ships.shared_structure import shared_structure
+        from shipgym.ships.shared_structure import SharedStructure
 
-        return shared_structure(name, table["source"], table["shares"])
+        return SharedStructure.of(name, table["source"], table["shares"])
     if "letters" in table:
         letters = table.pop("letters")
         table["equations"] = _by_axis(letters, short_terms)
