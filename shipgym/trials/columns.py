@@ -3,11 +3,9 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, SupportsIndex
+from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
+from shipgym.arrays import Integers
 from shipgym.checks import (
     check_keys,
     check_number,
@@ -74,7 +72,7 @@ class Locator:
 
     table: LogTable
     columns: Mapping[str, Column]  # by channel, ``t`` included
-    rows: npt.NDArray[np.intp]  # shape (n_samples,); row of the table of each sample
+    rows: Integers  # shape (n_samples,); row of the table of each sample
 
     @property
     def path(self) -> str:
@@ -87,7 +85,7 @@ class Locator:
         name = self.columns["psi"].name if "psi" in self.columns else ""
         return self.table.magnetic or "mag" in name.lower()
 
-    def place(self, sample: SupportsIndex, channel: str) -> str:
+    def place(self, sample: Any, channel: str) -> str:
         """Place of a value: ``run.csv: line 12 (data row 11), column 'yaw'``."""
         row = int(self.rows[sample])
         column = self.columns[channel].name

@@ -71,15 +71,12 @@ def rudder_side(t: Floats, psi: Floats, delta: Floats) -> RudderSide:
     dampings = relative / times[0, -1]
     fits = [_fit(times, headings, rudders, damping) for damping in dampings]
     best = min(fits, key=lambda fit: fit.squares)
-    as_good = [fit for fit in fits if fit.squares < 1.05 * best.squares]
-    certainty = best.certainty
-    agree = all(fit.certainty * certainty > 0.0 for fit in as_good)
-    errors = abs(certainty)
-    if not agree or not best.is_clear or errors <= 5.0:
+    errors = abs(best.certainty)
+    if not best.is_clear or errors <= 5.0:
         return RudderSide(None)
     evidence = f"the turning that follows the rudder, {errors:.0f} standard errors"
     # twice the errors of a guess: a refusal has to be right
-    return _side(certainty, evidence, is_sure=errors > 10.0)
+    return _side(best.certainty, evidence, is_sure=errors > 10.0)
 
 
 def _side(value: float, evidence: str, *, is_sure: bool) -> RudderSide:

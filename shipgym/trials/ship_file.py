@@ -99,6 +99,7 @@ def read_entries(
             every = {**sensors, **check_table(table["sensors"], place)}
             own["installation"] = Installation.from_mapping(every, place)
         conventions = replace(usual, **own, where=where)
+        _check_antenna(conventions.installation, ship, where)
         known = {**columns, **own_columns}
         entry = _read_entry(table, path.parent, where, known, conventions)
         part = os.path.normpath(entry.path), str(entry.cut)
@@ -113,6 +114,20 @@ def read_entries(
             ' use = "fit"'
         )
     return tuple(entries.values())
+
+
+def _check_antenna(at: Installation, ship: Particulars, where: str) -> None:
+    """Refuse an antenna that is not on the ship."""
+    beam = ship.beam or ship.length
+    for side, place, size in (
+        ("forward", at.forward, ship.length),
+        ("starboard", at.starboard, beam),
+    ):
+        if abs(place) > 0.75 * size:
+            raise InputError(
+                f"{where} gnss_antenna.{side}: expected a place on the ship, in m from"
+                f" midship, got {place:g} where her size is {size:g} m; correct it"
+            )
 
 
 def _read_entry(

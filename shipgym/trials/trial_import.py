@@ -10,6 +10,7 @@ from shipgym.trials.plausibility.agreement import (
     check_over_ground,
     check_speed_units,
     check_steps,
+    check_track,
     check_velocity,
     check_yaw_rate,
 )
@@ -114,6 +115,8 @@ def _check_channels(log: Log, conventions: Conventions) -> list[str]:
     if log.has("x", "y") or log.has("ground_north"):
         check_over_ground(log, conventions, locator)
         check_speed_units(log, locator)
+    if "lat" in locator.columns and log.has("ground_north", "psi"):
+        check_track(log, locator)
     if tells_turning:
         check_rudder_unit(log, locator)
     if log.has("psi", "r"):

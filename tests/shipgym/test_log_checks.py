@@ -81,6 +81,10 @@ def at(values, row, value):
             "expected the track of one ship, got a position that jumps",
         ),
         ({"psi": SWING, "sog": U, "cog": 1.2 + V}, "over ground by -40 deg; name the"),
+        (
+            {"psi": SWING, "sog": U, "cog": 2.0 * TURN},
+            "course over ground, got another",
+        ),
         ({"psi": TURN, "sog": U, "cog": TURN}, "less than 0.3 deg of difference in a"),
         ({"psi": TURN, "sog": U, "cog": 0.1 - TURN}, "it turns the other way; change"),
         ({"psi": TURN, "lat": U}, "columns: expected lat and lon, got lat alone"),

@@ -133,9 +133,9 @@ def test_times_before_the_lines_are_a_clock(stamp, kinds, tmp_path):
 
 
 def test_a_recorder_in_another_zone_keeps_its_clock(tmp_path):
-    trial = read(tmp_path, stamped(half_past, rmc, hdt, rsa))
-    assert_as_sailed(trial)
-    assert_said(trial, "time from stamps of the lines")
+    assert_as_sailed(read(tmp_path, stamped(half_past, rmc, hdt, rsa)))
+    reading = guess_trial(tmp_path / "log.nmea").reading
+    assert reading["t"] == "stamps of the lines"
 
 
 def test_a_recorder_that_writes_in_blocks_takes_the_time_of_the_satellites(tmp_path):
@@ -164,7 +164,7 @@ def test_the_name_of_a_file_and_its_ends_of_lines_do_not_matter(name, end, tmp_p
         ((rmc_varied, hdg, hdt, rsa), ["psi is from HEHDT (240 values); HCHDG"]),
         (
             (rmc, hdt, lambda one: rsa(one, ",V,{:.1f},A")),
-            ["delta from AGRSA port"],
+            [],
         ),
         ((rmc, hdt, lambda one: rsa(one, "{:.1f},,,")), ["status in 240 sentences"]),
         (

@@ -168,6 +168,21 @@ def test_the_course_tells_the_unit_of_a_heading_that_goes_on_after_a_turn(tmp_pa
     assert turned(guess.trial) < 0.1
 
 
+EXCHANGES = {
+    ("Lat", "Lon"): "a track that goes elsewhere; name the right columns of lat",
+    ("COG", "Heading"): "a track that follows the heading; name the right",
+}
+
+
+@pytest.mark.parametrize("pair", EXCHANGES)
+def test_exchanged_columns_are_told_by_the_track(tmp_path, pair):
+    names = {"Lat": "lat", "Lon": "lon", "COG": "course", "SOG": "speed"}
+    columns = plain(**{n: [getattr(k, names[n]) for k in SHIP] for n in names})
+    names = [{**dict([pair, pair[::-1]])}.get(name, name) for name in columns]
+    (decision,) = guessed(tmp_path, table(names, *columns.values())).decisions
+    assert EXCHANGES[pair] in decision.choices
+
+
 def test_units_that_a_name_or_recorder_defines_are_known(tmp_path):
     yaw = np.unwrap(PSI) - PSI[0]
     names = ["TIMESTAMPms", "M1ATTITUDEyaw", "M1ATTITUDEyawspeed", "rudcmd"]

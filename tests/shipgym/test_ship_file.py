@@ -193,6 +193,11 @@ def test_trials_are_read_with_the_file_s_conventions_or_their_own(folder):
         ),
         ('file = "a.csv"', "", ": [[trials]] 1: expected file = "),
         (
+            "[[trials]]",
+            "[sensors]\ngnss_antenna = { forward = -42.0 }\n[[trials]]",
+            ": [[trials]] 1 gnss_antenna.forward: expected a place on the ship",
+        ),
+        (
             'file = "a.csv"',
             'file = ["a.csv"]',
             " file: expected one file, got a list",

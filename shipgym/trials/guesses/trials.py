@@ -95,10 +95,11 @@ class TrialGuess:
     @property
     def reading(self) -> dict[str, str]:
         """What each channel, and the rudder's sign, was read as, and why."""
-        reading = {}
+        reading = dict(self.table.sources)
         for one in self.columns:
-            extra = "".join(f", {key} {value}" for key, value in one.extra.items())
-            where = f"column '{one.name}' in {one.unit}{extra}"
+            where = f"column '{one.name}' in {one.unit}"
+            for key, value in one.extra.items():
+                where += f", {key} {value}"
             reading[one.channel] = f"{where}, unit {one.reason}"
         for convention in self.conventions:
             reading[convention.name] = f"{convention.value}: {convention.reason}"
@@ -151,8 +152,7 @@ def guess_trial(path: str | Path) -> TrialGuess:
         guess.conventions = []
         return guess
     guess.side = _rudder_side(guess, guess.trial)
-    names = [one.name for one in guess.conventions]
-    if guess.side and guess.side.side == "port" and "rudder_positive" not in names:
+    if guess.side and guess.side.side == "port":
         guess.take("rudder_positive", "port", guess.side.reason)
         guess.trial = guess.read()
     guess.conventions = [

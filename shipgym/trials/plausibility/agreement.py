@@ -4,9 +4,9 @@ They are compared over windows in time, so that noise and offsets do not matter.
 """
 
 import math
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from shipgym.arrays import Floats, integral
 from shipgym.errors import InputError
@@ -15,22 +15,29 @@ from shipgym.trials.conventions import Conventions
 from shipgym.trials.resampling import Log, changes, usual_step
 from shipgym.trials.units import DEGREE, fitting_units
 
+_WINDOW = 10.0  # s, over which positions and headings change by more than noise
 
-def turning_gain(t: Floats, psi: Floats, swept: Floats) -> float:
+
+def turning_gain(
+    t: Floats, psi: Floats, swept: Floats, *, has_bias: bool = True
+) -> float:
     """How many times as fast a heading changes as another angle; 1 for no verdict.
 
-    That is a yaw rate's integral, or the course. In SI units, without jumps.
+    That is a yaw rate's integral, whose sensor may have a bias, or the course. In SI
+    units, without jumps.
     """
-    turned = _without_trend(t, psi)
-    expected = _without_trend(t, swept)
-    largest = max(np.ptp(turned), np.ptp(expected))
+    largest = max(np.ptp(psi), np.ptp(swept))
     if largest < 2.0 * DEGREE:
         return 1.0
 
-    known = np.diff(expected)
-    sought = np.diff(turned)
+    known = _rates(t, swept)
+    sought = _rates(t, psi)
+    if has_bias:
+        known -= known.mean()
+        sought -= sought.mean()
     power = max(float(known @ known), 1e-300)
     gain = float(known @ sought) / power
+
     residual = sought - gain * known
     whole = np.linalg.norm(sought)
     is_clear = np.linalg.norm(residual) < 0.5 * whole
@@ -38,16 +45,12 @@ def turning_gain(t: Floats, psi: Floats, swept: Floats) -> float:
     return gain if is_clear and not is_usual else 1.0
 
 
-def _without_trend(t: Floats, values: Floats) -> Floats:
-    """Values at the edges of windows without their line: a rate sensor has a bias."""
+def _rates(t: Floats, values: Floats) -> Floats:
+    """Rates in windows."""
     edges = np.linspace(0, t.size - 1, num=31)
     rows = np.unique(np.rint(edges).astype(int))
-    at_edges = values[rows]
-    passed = t[rows] - t[0]
-    time = passed / (t[-1] - t[0])
-    line = np.polyfit(time, at_edges, deg=1)
-    left: Floats = at_edges - np.polyval(line, time)
-    return left
+    rates: Floats = np.diff(values[rows]) / np.diff(t[rows])
+    return rates
 
 
 def check_yaw_rate(log: Log, locator: Locator) -> None:
@@ -55,23 +58,31 @@ def check_yaw_rate(log: Log, locator: Locator) -> None:
     swept = integral(log.t, log.channels["r"])
     gain = turning_gain(log.t, log.channels["psi"], swept)
     heading, rate = (locator.columns[channel].name for channel in ("psi", "r"))
-    expected = f"{locator.path}: expected columns '{heading}' (heading) and '{rate}'"
     if gain < 0.0:
         raise InputError(
-            f"{expected} (yaw rate) to be positive when the bow turns to starboard"
-            " (clockwise seen from above), got opposite signs; change the sign of the"
-            " column that is positive to port"
+            f"{locator.path}: expected columns '{heading}' (heading) and '{rate}' (yaw"
+            " rate) to be positive when the bow turns to starboard (clockwise seen from"
+            " above), got opposite signs; change the sign of the column that is"
+            " positive to port"
         )
     if gain != 1.0:
         proposals = _nearest_units(locator, psi=1.0 / gain, r=gain)
-        declarations = [locator.declaration(*one) for one in proposals]
-        alternatives = " or ".join(declarations) or "the unit of each"
-        raise InputError(
-            f"{expected} (yaw rate) to agree, got a heading that changes {gain:.3g}"
-            " times as fast as the yaw rate says; likely a wrong unit, declare"
-            f" {alternatives}",
-            proposals,
-        )
+        raise _other_unit("yaw rate", gain, proposals, locator)
+
+
+def _other_unit(
+    other: str, gain: float, proposals: list[tuple[str, str]], locator: Locator
+) -> InputError:
+    """Fault of a heading that changes as another angle does, in another unit."""
+    declarations = [locator.declaration(*one) for one in proposals]
+    alternatives = " or ".join(declarations) or "the unit of each"
+    heading = locator.columns["psi"].name
+    return InputError(
+        f"{locator.path}: expected column '{heading}' (heading) and the {other} to"
+        f" agree, got a heading that changes {abs(gain):.3g} times as fast as the"
+        f" {other} says; likely a wrong unit, declare {alternatives}",
+        proposals,
+    )
 
 
 def _nearest_units(locator: Locator, **ratios: float) -> list[tuple[str, str]]:
@@ -116,17 +127,15 @@ def check_velocity(log: Log, frame: str, locator: Locator) -> None:
     """
     channels = log.channels
     velocity = channels["u"] + 1j * channels["v"]
-    position = channels["x"] + 1j * channels["y"]
-    body = integral(log.t, velocity * np.exp(1j * channels["psi"]))
-    earth = integral(log.t, velocity)
-    _, moved, *sailed = changes(log.t, 10.0, position, body, earth)
-    told = dict(zip(("body", "earth"), sailed, strict=True))
-    expected = told.pop(frame)
-    ((other, in_other),) = told.items()
-    declared = np.linalg.norm(moved - expected)
-    misfit = np.linalg.norm(moved - in_other)
+    turned = velocity * np.exp(1j * channels["psi"])
+    moved, *sailed = _moved(log, turned, velocity)
+    other = "earth"
+    if frame == "earth":
+        other = "body"
+        sailed.reverse()
+    misfit, of_other = (np.linalg.norm(moved - one) for one in sailed)
     usual = 0.2 * np.linalg.norm(moved)
-    if declared > max(usual, 5.0 * misfit):
+    if misfit > max(usual, 5.0 * of_other):
         u = locator.columns["u"].name
         v = locator.columns["v"].name
         raise InputError(
@@ -136,23 +145,33 @@ def check_velocity(log: Log, frame: str, locator: Locator) -> None:
             f' velocity_frame = "{other}"',
             [("velocity_frame", other)],
         )
-    _check_size(moved, expected, locator)
+    _check_size(moved, sailed[0], locator)
 
 
-def _check_size(
-    moved: npt.NDArray[np.complex128],
-    expected: npt.NDArray[np.complex128],
-    locator: Locator,
-) -> None:
+def _moved(log: Log, *velocities: Any) -> list[Any]:
+    """Changes of position in windows, m, as logged and by each of some velocities.
+
+    All are north and, imaginary, east.
+    """
+    position = log.channels["x"] + 1j * log.channels["y"]
+    sailed = [integral(log.t, one) for one in velocities]
+    _, *moved = changes(log.t, _WINDOW, position, *sailed)
+    return moved
+
+
+def _check_size(moved: Any, expected: Any, locator: Locator) -> None:
     """Refuse positions that follow the velocities, but in another size.
 
-    Both are changes of position in some windows, m: north and, imaginary, east.
+    Both are as of :func:`_moved`.
     """
     squared = float(np.vdot(expected, expected).real)
     gain = complex(np.vdot(expected, moved)) / max(squared, 1e-300)
     misfit = np.linalg.norm(moved - gain * expected)
     follows = misfit < 0.2 * np.linalg.norm(moved)
-    if not follows or 0.55 < abs(gain) < 1.8:
+    if not follows:
+        return
+
+    if 0.55 < abs(gain) < 1.8:
         return
     x, u = (locator.columns[channel].name for channel in "xu")
     raise InputError(
@@ -186,35 +205,57 @@ def check_over_ground(log: Log, conventions: Conventions, locator: Locator) -> N
         return
     psi = log.channels["psi"][moving]
     course = np.arctan2(east, north)[moving]
-    _check_heading_unit(log.t[moving], psi, np.unwrap(course), locator)
+    t, turned = log.t[moving], np.unwrap(course)
+    gain = turning_gain(t, psi, turned, has_bias=False)
+    proposals = _nearest_units(locator, psi=1.0 / abs(gain))
+    declared = ("psi", locator.columns["psi"].unit)
+    if proposals and declared not in proposals:
+        raise _other_unit("course over ground", gain, proposals, locator)
     if not is_compass:
         return
-    apart = np.exp(1j * (course - psi))
-    agreement = abs(apart.mean())
-    both = np.exp(1j * (course + psi))
-    mirrored = both.mean()
-    is_turning = np.ptp(psi) > 20.0 * DEGREE
-    limit = max(0.95, agreement + 0.02)
-    if is_turning and abs(mirrored) > limit:
-        raise _mirrored(mirrored, conventions, locator)
+    if gain < 0.0 and np.ptp(psi) > 20.0 * DEGREE:
+        both = np.exp(1j * (course + psi))
+        raise _mirrored(both.mean(), conventions, locator)
     fault = _heading_fault(psi, course, conventions.installation.heading_offset)
+    if _is_unrelated(t, psi, turned):
+        fault = "that turns with the course over ground, got another; name its column"
     if fault:
         raise InputError(f"{locator.path}: expected a heading {fault}")
 
 
-def _check_heading_unit(
-    t: Floats, psi: Floats, course: Floats, locator: Locator
-) -> None:
-    """Refuse a heading that turns as the course over ground, but in another unit."""
-    gain = abs(turning_gain(t, psi, course))
-    proposals = _nearest_units(locator, psi=1.0 / gain)
-    declared = ("psi", locator.columns["psi"].unit)
-    if proposals and declared not in proposals:
+def _is_unrelated(t: Floats, psi: Floats, course: Floats) -> bool:
+    """Return whether a course goes round without the heading, which moves otherwise.
+
+    Without jumps, rad. A heading that stands still does not make it worse.
+    """
+    goes_round = np.ptp(course) > np.ptp(psi) + math.pi
+    _, turned, expected = changes(t, _WINDOW, psi, course)
+    left = np.linalg.norm(expected - turned)
+    return bool(goes_round and left > np.linalg.norm(expected))
+
+
+def check_track(log: Log, locator: Locator) -> None:
+    """Refuse positions that do not go where the course over ground points to.
+
+    Where that column is the heading, it leads the track in turns, and the column of the
+    heading shows the track. Speeds have the right unit.
+    """
+    channels = log.channels
+    velocity = channels["ground_north"] + 1j * channels["ground_east"]
+    ahead = np.abs(velocity) * np.exp(1j * channels["psi"])
+    moved, sailed, headed = _moved(log, velocity, ahead)
+    misfit = np.linalg.norm(moved - sailed)
+    by_heading = np.linalg.norm(moved - headed)
+    _, turned = changes(log.t, _WINDOW, channels["psi"])
+    lead = np.conj(moved) * sailed
+    leads = turned @ lead.imag > 0.0
+    is_exchanged = leads and by_heading < 0.3 * misfit
+    if is_exchanged or misfit > 0.7 * np.linalg.norm(moved):
+        follows = "follows the heading" if is_exchanged else "goes elsewhere"
         raise InputError(
-            f"{locator.path}: expected a heading that turns with the course over"
-            f" ground, got one that turns {gain:.3g} times as fast; likely a wrong"
-            f" unit, declare {locator.declaration(*proposals[0])}",
-            proposals,
+            f"{locator.path}: expected positions that follow the course over ground,"
+            f" got a track that {follows}; name the right columns of lat, lon, cog and"
+            " psi"
         )
 
 
@@ -235,17 +276,15 @@ def check_speed_units(log: Log, locator: Locator) -> None:
         is_guess = isinstance(column, ColumnGuess) and not column.is_named
         largest = 0.3 if is_guess else 0.16
         units = fitting_units(channel, column.unit, ratio, largest)
-        unit = next(iter(units), "")
         is_usual = not is_guess and 0.6 < ratio < 1.67
-        is_own = unit == column.unit
-        if is_usual or is_own or not unit:
+        if is_usual or not units or units[0] == column.unit:
             continue
-        declaration = locator.declaration(channel, unit)
+        declaration = locator.declaration(channel, units[0])
         raise InputError(
             f"{locator.path}: expected column '{column.name}' to agree with the speed"
             f" over ground, got {ratio:.3g} times as much over ground, which no current"
             f" does; likely a wrong unit, declare {declaration}",
-            [(channel, unit)],
+            [(channel, units[0])],
         )
 
 
@@ -265,8 +304,7 @@ def _usual_speed(log: Log) -> float:
     if not log.has("x"):
         return float(np.median(np.hypot(*log.ground_velocity)))
     passed, north, east = changes(log.t, 5.0, log.channels["x"], log.channels["y"])
-    speeds = np.hypot(north, east) / passed
-    return float(np.median(speeds))
+    return float(np.median(np.hypot(north, east) / passed))
 
 
 def _mirrored(

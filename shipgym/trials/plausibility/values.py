@@ -148,9 +148,7 @@ def check_rudder_unit(log: Log, locator: Locator) -> None:
 
     The channels are in SI units, the heading without jumps.
     """
-    turned_deg = math.degrees(np.ptp(log.heading))
-    passed, turned = changes(log.t, 5.0, log.heading)
-    fastest = np.quantile(np.abs(turned) / passed, 0.95)
+    turned_deg, fastest = _turning(log)
     for channel in locator.columns.keys() & log.channels.keys() & _RUDDERS:
         column = locator.columns[channel]
         largest = np.abs(log.channels[channel]).max()
@@ -167,6 +165,13 @@ def check_rudder_unit(log: Log, locator: Locator) -> None:
             f" {locator.declaration(channel, 'rad')}",
             [(channel, "rad")],
         )
+
+
+def _turning(log: Log) -> tuple[float, float]:
+    """Range of the heading, deg, and how fast it turns over some seconds, rad/s."""
+    passed, turned = changes(log.t, 5.0, log.heading)
+    rates = np.abs(turned) / passed
+    return math.degrees(np.ptp(log.heading)), float(np.quantile(rates, 0.95))
 
 
 def frozen_heading(log: Log) -> list[str]:

@@ -53,6 +53,8 @@ class LogTable:
         Texts of a row of units below the names, by column.
     notes : tuple of str
         What the reader left out or assumed.
+    sources : mapping of str to str
+        Sender and kind of the messages of each channel, and of the time.
     own_clocks : bool
         Whether each column has a clock of its own, so that a row may lack values.
     magnetic : bool
@@ -67,6 +69,7 @@ class LogTable:
     units: Mapping[str, str] = field(default_factory=dict)
     unit_row: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    sources: Mapping[str, str] = field(default_factory=dict)
     own_clocks: bool = False
     magnetic: bool = False
     _parsed: dict[str, _Parsed] = field(

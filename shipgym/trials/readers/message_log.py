@@ -5,6 +5,7 @@ mixed, with or without a time before each.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -80,11 +81,7 @@ def _choose_tracks(
             left_out.append(
                 f"{channel} of {track.source} left out: only {track.t.size} values"
             )
-    by_source: dict[str, list[str]] = {}
-    for channel, track in tracks.items():
-        by_source.setdefault(track.source, []).append(channel)
-    read = [f"{', '.join(names)} from {source}" for source, names in by_source.items()]
-    notes += [f"{'; '.join(read)}; time from {clock.source}", *left_out]
+    notes += left_out
     return tracks, is_magnetic
 
 
@@ -185,7 +182,8 @@ def read_messages(path: Path, content: bytes) -> LogTable:
             f"{path}: expected several values of a ship's motion (RMC, HDT, HDG, ROT,"
             " RSA and others), got too few: log these too"
         )
-    return _table(path, tracks, notes, magnetic=is_magnetic)
+    table = _table(path, tracks, notes, magnetic=is_magnetic)
+    return replace(table, sources={"t": clock.source, **table.sources})
 
 
 def _check_damage(path: Path, heard: Heard) -> list[str]:
@@ -221,6 +219,7 @@ def _table(
         place_words="line {line}",
         units={"t": "unix"},
         notes=tuple(notes),
+        sources={channel: track.source for channel, track in tracks.items()},
         own_clocks=True,
         magnetic=magnetic,
     )
