@@ -103,9 +103,10 @@ def run_cell(entry: Entry, task: BenchmarkTask, options: Options) -> Cell:
     for on in task.sets:
         seeds = judging_seeds(on, options.episodes, options.seed)
         sailed = [evaluate(policy, task, seeds, on) for policy in made.policies]
-        figures[on] = {}
-        for name in sailed[0][0]:
-            figures[on][name] = np.stack([found[name] for found, _ in sailed])
+        figures[on] = {
+            name: np.stack([found[name] for found, _ in sailed])
+            for name in sailed[0][0]
+        }
         for _, run in sailed:
             if run.failure:
                 failures.setdefault(on, run.failure)

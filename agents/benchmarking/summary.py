@@ -117,10 +117,9 @@ class Summary:
         of which not all tasks were run has no scores.
         """
         rankings = {}
-        for task in self.tasks:
-            if task.part not in rankings:
-                totals = [self._total(name, task.part, by_task) for name in self.names]
-                rankings[task.part] = sorted(totals, key=_sort_key)
+        for part in dict.fromkeys(task.part for task in self.tasks):
+            totals = [self._total(name, part, by_task) for name in self.names]
+            rankings[part] = sorted(totals, key=_sort_key)
         return rankings
 
     def _total(self, name: str, part: str, by_task: ByTask) -> dict[str, Any]:

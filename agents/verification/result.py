@@ -180,7 +180,7 @@ def track_metrics(track: Track) -> dict[str, Any]:
     if not len(drawn):
         drawn = track.largest
     return {
-        "gains": _floats(track.controller.gains),
+        "gains": track.controller.gains,
         "cross_track_largest_m": float(track.largest[0]),
         "cross_track_rmse_m": float(track.rms[0]),
         "cross_track_largest_m_quantile_95": upper_95(drawn),
@@ -194,7 +194,7 @@ def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
     episodes = pilot.episodes
     rmse_deg = episodes.heading_rmse_deg
     return {
-        "gains": _floats(pilot.controller.gains),
+        "gains": pilot.controller.gains,
         "margins": _finite(asdict(pilot.controller.margins)),
         "cost_mean": float(np.mean(episodes.cost)),
         "cost_median": float(np.median(episodes.cost)),
@@ -205,10 +205,6 @@ def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
         "extrapolating_mean": float(np.mean(episodes.extrapolating)),
         "lost_control": int(np.sum(episodes.terminated)),
     }
-
-
-def _floats(values: dict[str, Any]) -> dict[str, float]:
-    return {name: float(value) for name, value in values.items()}
 
 
 def _finite(values: dict[str, float]) -> dict[str, float | None]:

@@ -56,7 +56,6 @@ class LinearRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
     coef_: Floats
     intercept_: float = 0.0
-    n_features_in_: int
 
     @property
     def method_name(self) -> str:
