@@ -378,7 +378,8 @@ def _settling_lag(trials: Sequence[Trial], rate: float) -> float:
 
     Where the rudder has slowed down to half the rate, half of rate times lag is left to
     go. 0 where the median of that does not differ from what a gear without lag has to
-    go in its last sampling step, an eighth of a step on average.
+    go in its last sampling step: an eighth of a step on average, up to a half where all
+    moves end at the same part of a step.
     """
     left = list[float]()
     step = 0.0
@@ -394,9 +395,10 @@ def _settling_lag(trials: Sequence[Trial], rate: float) -> float:
     if len(left) < fewest_moves:
         return 0.0
     low, middle, high = np.quantile(left, [0.25, 0.5, 0.75])
-    error = (high - low) / np.sqrt(len(left))
-    least = 0.125 * rate * step + 3.0 * error
-    if middle <= least:
+    spread = high - low
+    on_average = 0.125 * rate * step + 3.0 * spread / np.sqrt(len(left))
+    in_step = 0.5 * rate * step - spread
+    if middle <= max(on_average, in_step):
         return 0.0
     return float(2.0 * middle / rate)
 
