@@ -51,7 +51,12 @@ def verdict(trials: Sequence[Trial], to_decide: Sequence[str]) -> tuple[str, str
     """A sentence on what the trials are good for; "good", "warn" or "bad"."""
     if to_decide:
         return f"{counted(len(to_decide), 'decision')} to take before use.", "bad"
-    channels = {channel for trial in trials for channel in trial.channels}
+    channels = {
+        name
+        for trial in trials
+        for name, values in trial.channels.items()
+        if values.min() < values.max()
+    }
     if not channels & {"delta", "delta_command"}:
         return "Nothing can be identified from this: there is no rudder.", "bad"
     if not channels & {"psi", "r"}:

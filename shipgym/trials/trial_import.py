@@ -3,6 +3,8 @@
 import math
 from collections.abc import Collection, Mapping
 
+import numpy as np
+
 from shipgym.trials.columns import Column
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.midship import to_project_conventions
@@ -111,6 +113,11 @@ def _check_channels(log: Log, conventions: Conventions) -> list[str]:
     remarks = lacking(log.channels)
     remarks += frozen_heading(log)
     remarks += check_steps(log.t, locator)
+    if log.has("delta") and np.ptp(log.channels["delta"]) == 0.0:
+        remarks.append(
+            "the rudder stays where it is: nothing can be identified from this log, it"
+            " can only be looked at"
+        )
     tells_turning = log.has("psi") or log.has("r")
     if log.has("x", "y") or log.has("ground_north"):
         check_over_ground(log, conventions, locator)

@@ -161,13 +161,19 @@ def test_a_heading_that_is_stuck_is_noted(tmp_path):
 
 
 def test_the_course_tells_the_unit_of_a_heading_that_goes_on_after_a_turn(tmp_path):
-    places = {"Lat": [one.lat for one in SHIP], "Lon": [one.lon for one in SHIP]}
-    columns = plain(Heading=PSI + 4.0 * np.pi, **places)
+    columns = plain(Heading=PSI + 4.0 * np.pi, **PLACES)
     guess = guessed(tmp_path, table(columns, *columns.values()))
     assert guess.reading["psi"].startswith("column 'Heading' in rad, unit fits where")
     assert turned(guess.trial) < 0.1
 
 
+def test_a_rudder_that_never_moves_is_said_to_stay(tmp_path):
+    columns = plain(Rudder=0 * T)
+    notes = guessed(tmp_path, table(columns, *columns.values())).trial.notes
+    assert any(one.startswith("the rudder stays where it is") for one in notes)
+
+
+PLACES = {name: [getattr(one, name.lower()) for one in SHIP] for name in ("Lat", "Lon")}
 EXCHANGES = {
     ("Lat", "Lon"): "a track that goes elsewhere; name the right columns of lat",
     ("COG", "Heading"): "a track that follows the heading; name the right",
@@ -176,9 +182,10 @@ EXCHANGES = {
 
 @pytest.mark.parametrize("pair", EXCHANGES)
 def test_exchanged_columns_are_told_by_the_track(tmp_path, pair):
-    names = {"Lat": "lat", "Lon": "lon", "COG": "course", "SOG": "speed"}
-    columns = plain(**{n: [getattr(k, names[n]) for k in SHIP] for n in names})
-    names = [{**dict([pair, pair[::-1]])}.get(name, name) for name in columns]
+    ground = {"COG": [one.course for one in SHIP], "SOG": [one.speed for one in SHIP]}
+    columns = plain(**PLACES, **ground)
+    exchanged = dict([pair, pair[::-1]])
+    names = [exchanged.get(name, name) for name in columns]
     (decision,) = guessed(tmp_path, table(names, *columns.values())).decisions
     assert EXCHANGES[pair] in decision.choices
 

@@ -229,7 +229,10 @@ def test_a_sheet_may_have_titles_and_a_row_of_units(tmp_path):
     units = ["-", "deg", "deg", "kn", "deg", "deg", "deg"]
     rows = [[row[0], *map(float, row[1:])] for row in CELLS]
     frame = pandas.DataFrame([["Trial"] + 6 * [None], NAMES, units, *rows])
-    frame.to_excel(tmp_path / "log.xlsx", index=False, header=False)
+    with pandas.ExcelWriter(tmp_path / "log.xlsx") as book:
+        frame.to_excel(book, sheet_name="Log", index=False, header=False)
+        frame.to_excel(book, sheet_name="Rudder")
     guess = guess_trial(tmp_path / "log.xlsx")
     assert_as_sailed(guess)
+    assert "only sheet 'Log' is read, not 'Rudder'" in " ".join(guess.trial.notes)
     assert "unit from the row of units" in guess.reading["sog"]

@@ -184,8 +184,8 @@ def guess_columns(table: LogTable) -> list[ColumnGuess]:
     free = list(table.header)
     guesses: dict[str, ColumnGuess] = {}
 
-    def take(channel: str, patterns: str) -> None:
-        found = _first_match(table, free, channel, known[patterns])
+    def take(channel: str, patterns: str, *, still: bool = False) -> None:
+        found = _first_match(table, free, channel, known[patterns], still=still)
         if found is not None:
             guesses[channel] = found
             free.remove(found.name)
@@ -199,6 +199,8 @@ def guess_columns(table: LogTable) -> list[ColumnGuess]:
         is_channel = channel in QUANTITIES and not is_speed_alone
         if is_channel:
             take(channel, channel)
+    if guesses.keys().isdisjoint(RUDDERS):
+        take("delta", "delta", still=True)
     if "psi" not in guesses:
         attitude = _quaternion(table, free)
         if attitude is None:
@@ -267,13 +269,21 @@ def _quaternion(table: LogTable, free: list[str]) -> ColumnGuess | None:
 
 
 def _first_match(
-    table: LogTable, free: list[str], channel: str, patterns: list[str]
+    table: LogTable,
+    free: list[str],
+    channel: str,
+    patterns: list[str],
+    *,
+    still: bool,
 ) -> ColumnGuess | None:
-    """Guess of a channel by the first of its patterns that a column has."""
+    """Guess of a channel by the first of its patterns that a column has.
+
+    Unless it may stand `still`, a column that never changes is no rudder or heading.
+    """
     fitting: list[ColumnGuess] = []
     for column in free:
         unit = _unit_where_fitting(table, column, channel)
-        if unit is not None and _may_be(table, column, channel):
+        if unit is not None and _may_be(table, column, channel, still=still):
             fitting.append(ColumnGuess(column, channel=channel, **unit._asdict()))
     fitting.sort(key=lambda one: one.unit == UNKNOWN)
     of_unit = _column_names()["with_unit"].get(channel, [])
@@ -340,13 +350,14 @@ def _unit_by_size(table: LogTable, column: str, channel: str) -> UnitGuess:
     return unit_by_size(values, channel)
 
 
-def _may_be(table: LogTable, column: str, channel: str) -> bool:
+def _may_be(table: LogTable, column: str, channel: str, *, still: bool) -> bool:
     """Return whether the values of a column may be a channel's, whatever its name."""
     values = table.likely_numbers(column)
     if values is None:  # texts, such as times and positions
         return True
     known = values[np.isfinite(values)]
-    if known.size < 3 or (channel in _MOVING and np.ptp(known) == 0.0):
+    has_to_move = channel in _MOVING and not still
+    if known.size < 3 or (has_to_move and np.ptp(known) == 0.0):
         return False
     largest_change_deg = 20.0  # of positions in a log
     if channel in ("lat", "lon") and np.abs(known).max() < 360.0:

@@ -265,7 +265,7 @@ def _rudder_side(guess: TrialGuess, trial: Trial) -> RudderSide | None:
     """Side of the rudder by its letters or its turning; None without it or heading."""
     command = trial.channels.get("delta_command")
     rudder = trial.channels.get("delta", command)
-    if "psi" not in trial or rudder is None:
+    if "psi" not in trial or rudder is None or np.ptp(rudder) == 0.0:
         return None
     for one in guess.columns:
         text = guess.table.first_text(one.name)

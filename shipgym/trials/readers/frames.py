@@ -5,10 +5,12 @@ import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from shipgym.checks import quoted, shown
 from shipgym.errors import InputError
 from shipgym.trials.readers.csv_file import read_csv
 from shipgym.trials.readers.log_table import LogTable
@@ -103,6 +105,17 @@ def read_excel(path: Path, content: bytes) -> LogTable:
         parts = zipfile.ZipFile(io.BytesIO(content)).infolist()
         check_unpacked(path, sum(part.file_size for part in parts))
         pandas = import_module("pandas")
-        sheet = pandas.read_excel(io.BytesIO(content), header=None, dtype=object)
-        text = sheet.dropna(axis=1, how="all").to_csv(header=False, index=False)
-        return replace(read_csv(path, text.encode()), place_words="row {line}")
+        book = pandas.ExcelFile(io.BytesIO(content))
+        sheet, *others = book.sheet_names
+        frame = pandas.read_excel(book, sheet, header=None, dtype=object)
+        text = frame.dropna(axis=1, how="all").to_csv(header=False, index=False)
+        table = read_csv(path, text.encode())
+        read = partial(pandas.read_excel, book, header=None, nrows=1)
+        filled = [one for one in others if not read(sheet_name=one).empty]
+        notes = list(table.notes)
+        if filled:
+            notes.append(
+                f"only sheet {shown(sheet)} is read, not {quoted(filled)}; save the"
+                " right one alone, or all channels in one sheet"
+            )
+        return replace(table, notes=tuple(notes), place_words="row {line}")
