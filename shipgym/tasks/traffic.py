@@ -92,6 +92,13 @@ def target_of(motion: Motion) -> Target:
     )
 
 
+def distance_to(motion: Motion, target: Target) -> float:
+    """Distance of another ship, m."""
+    away_x = target.x - motion.x
+    away_y = target.y - motion.y
+    return sqrt(away_x * away_x + away_y * away_y)
+
+
 def approach(motion: Motion, target: Target) -> Approach:
     """How a ship in still water, and another, approach each other."""
     away_x = target.x - motion.x
