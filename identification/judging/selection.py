@@ -175,6 +175,7 @@ def _differs_by_chance(fit: RankedFit, first: RankedFit) -> bool:
         fit.of_pieces,
         first.of_pieces,
     )
-    by_chance = float(np.std(differences)) / np.sqrt(max(len(differences) - 1, 1))
+    freedom = max(len(differences) - 1, 1)
+    by_chance = float(np.std(differences)) / np.sqrt(freedom)
     nothing = 0.02
     return bool(np.mean(differences) <= max(by_chance, nothing))
