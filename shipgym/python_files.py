@@ -16,6 +16,9 @@ from typing import Any
 from shipgym.checks import check_table
 from shipgym.errors import InputError
 
+LONGEST_CALL = 5.0  # s, of a user's function
+LONGEST_PAUSE = 0.1  # s of it that a call of a library counts as, at most
+NO_END = "look for a loop that does not end"
 #: Where code is that is not a user's own.
 LIBRARIES = (
     *(
@@ -106,9 +109,13 @@ def refuse_closure(function: Any) -> None:
 
 
 def asked(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Call a user's function; InputError names file and line of an error in it."""
+    """Call a user's function; InputError names file and line of an error in it.
+
+    One that does not return within `LONGEST_CALL` is an error too.
+    """
     try:
-        return function(*arguments)
+        with time_limit(LONGEST_CALL):
+            return function(*arguments)
     except InputError:
         raise
     except Exception as error:
@@ -120,15 +127,20 @@ def asked(function: Callable[..., Any], *arguments: Any) -> Any:
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
     """Raise a TimeoutError in a user's function that is still running after a time."""
-    end = monotonic() + seconds
+    left = seconds
+    seen = monotonic()
 
     def look(frame: FrameType, event: str, argument: Any) -> Any:
+        nonlocal left, seen
         if frame.f_code.co_filename.startswith(LIBRARIES):
             return None
-        if monotonic() > end:
+        now = monotonic()
+        left -= min(now - seen, LONGEST_PAUSE)
+        seen = now
+        if left < 0.0:
             raise TimeoutError(
-                f"expected a function that returns, got none after {seconds:g} s; look"
-                " for a loop that does not end"
+                f"expected a function that returns, got none after {seconds:g} s;"
+                f" {NO_END}"
             )
         return look
 
@@ -179,5 +191,5 @@ def file_options(task: Any) -> dict[str, Any]:
     """Keywords that the file of a task names in `OPTIONS`; none for another task."""
     if not str(task).endswith(".py"):
         return {}
-    named = vars(load_file(Path(task))).get("OPTIONS", {})
+    named = vars(asked(load_file, Path(task))).get("OPTIONS", {})
     return dict(check_table(named, f"{task}: OPTIONS"))

@@ -122,6 +122,8 @@ class Entry:
                 f"{where}: expected at most {budget:,.0f} ship steps in making a run,"
                 f" got {steps:,.0f}; search or train for less"
             )
+        if source != self.source:
+            where += f": has no rule(seen, ship, settings), and '{source}' does not fit"
         hidden = model_hash(load_model(task.true_ship)) if task.true_ship else None
         for policy in policies:
             check_fits(policy, given.task, given.ship, where)

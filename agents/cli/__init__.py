@@ -14,7 +14,8 @@ try:
     from collections.abc import Callable
     from io import TextIOWrapper
     from pathlib import Path
-    from threading import Timer
+    from socket import socketpair
+    from threading import Event, Thread, Timer
     from typing import Annotated, Any
 
     import typer
@@ -42,6 +43,8 @@ try:
     from agents.cli.trials import trials_command
 except KeyboardInterrupt:  # Ctrl-C before any command began
     sys.exit(130)
+
+PATIENCE = 5.0  # s until a process that does not hear Ctrl-C ends
 
 app = typer.Typer(
     cls=CommandGroup,
@@ -151,6 +154,31 @@ def _unraisable(failed: Any) -> None:
         sys.__unraisablehook__(failed)
 
 
+def _listen() -> None:
+    """Clean up on Ctrl-C and SIGTERM; end the process where Python does not hear them.
+
+    Compiled code of a user's task, in a loop that does not end, keeps them from it.
+    """
+    heard = Event()
+    ears, mouth = socketpair()
+
+    def interrupt(*_: Any) -> None:
+        heard.set()
+        raise KeyboardInterrupt
+
+    def listen() -> None:
+        ears.recv(1)
+        if not heard.wait(PATIENCE):
+            os.write(2, b"Error: interrupted in a loop that does not end\n")
+            os._exit(INTERRUPTED)
+
+    mouth.setblocking(False)
+    signal.set_wakeup_fd(mouth.detach())  # told at once, whatever Python does
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, interrupt)
+    Thread(target=listen, daemon=True).start()
+
+
 def main() -> None:
     """Run the command line."""
     for stream in (sys.stdout, sys.stderr):
@@ -162,7 +190,7 @@ def main() -> None:
     # joblib's, of a job that ended with an error, which is said anyway
     warnings.filterwarnings("ignore", "A worker stopped while some jobs")
     sys.unraisablehook = _unraisable
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # clean up as on Ctrl-C
+    _listen()
     try:
         app(prog_name="shipgym")
     except OSError as error:  # of the help, which no command prints

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from math import ceil
 from pathlib import Path
@@ -182,16 +182,17 @@ class BenchmarkTask:
         model: ShipModel | None = None,
         on: str = "model",
     ) -> Engine:
-        """Return many ships at once in a set of its episodes, by default the model."""
+        """Return many ships at once in a set of its episodes, by default the model.
+
+        InputError for a task of a user's own that is not sound (`check_once`).
+        """
         from shipgym.envs.engine import Engine
+        from shipgym.envs.task_checker import check_once
 
         ship, task, randomisation = self.scenario(on)
-        return Engine(
-            ship if model is None else model,
-            num_envs,
-            task,
-            randomisation,
-        )
+        engine = Engine(model or ship, num_envs, task, randomisation)
+        check_once(engine, randomisation)
+        return engine
 
     @property
     def files(self) -> list[Path]:
@@ -205,7 +206,7 @@ class BenchmarkTask:
 
     def to_dict(self) -> dict[str, Any]:
         """Return its fields, ready for JSON."""
-        return {part.name: getattr(self, part.name) for part in fields(self)}
+        return asdict(self)
 
 
 def judging_seeds(on: str, number: int, seed: int = 0) -> Integers:

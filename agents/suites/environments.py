@@ -67,7 +67,14 @@ def read_environment(
     module, colon, name = text.rpartition(":")
     if colon:
         import_named(module, text, where)
-    options = dict(_registered(name, where))
+    found = registered()
+    if name not in found:
+        known = [*SHORT_NAMES, *found]
+        raise InputError(
+            f"{where}: expected one of {quoted(known)}, the file of a task, or"
+            f" module:id, got '{name}'.{did_you_mean(name, known)}"
+        )
+    options = dict(found[name])
     for keyword in PACE:
         options.pop(keyword, None)
     task = options.pop("task")
@@ -95,15 +102,3 @@ def import_named(module: str, text: str, where: str) -> ModuleType:
             f"{where}: expected module:name, got '{text}', which cannot be imported"
             f" ({type(error).__name__}: {error})"
         ) from None
-
-
-def _registered(name: str, where: str) -> dict[str, Any]:
-    """Keywords of an environment of shipgym by its id."""
-    found = registered()
-    if name in found:
-        return found[name]
-    known = [*SHORT_NAMES, *found]
-    raise InputError(
-        f"{where}: expected one of {quoted(known)}, the file of a task, or module:id,"
-        f" got '{name}'.{did_you_mean(name, known)}"
-    )

@@ -8,7 +8,7 @@ that exceeds one is ranked after those that do not.
 from collections.abc import Mapping
 from typing import Any
 
-from shipgym.checks import check_keys, check_number, check_table
+from shipgym.checks import check_number, check_table
 
 #: Figures of `agents.rollouts.metrics` that a suite may limit, and the statistic over
 #: episodes that counts. Of heel: 2008 IS Code, part A, 3.1.2 (at most 10 deg by
@@ -28,8 +28,7 @@ def read_limits(value: Any, where: str) -> dict[str, float]:
 
     Raises InputError naming the field at fault.
     """
-    table = check_table(value, where)
-    check_keys(table, LIMITED_FIGURES, where)
+    table = check_table(value, where, LIMITED_FIGURES)
     return {
         name: check_number(limit, f"{where}.{name}", at_least=0.0)
         for name, limit in table.items()

@@ -149,6 +149,7 @@ def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
         AttributeError,
         NotImplementedError,
     ) as error:
+        SHARED.clear()  # Numba tells of an unset variable once
         raise InputError(explanation(error, what)) from None
     finally:
         numba.config.ALWAYS_WARN_UNINIT_VAR = before

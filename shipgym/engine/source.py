@@ -30,7 +30,7 @@ def read_source(source: Any) -> tuple[Any, str]:
     """Return the names that a file or module defines, and its place for messages."""
     namespace = source
     if isinstance(source, str | Path):
-        namespace = load_file(Path(source))
+        namespace = asked(load_file, Path(source))
     file = getattr(namespace, "__file__", None)
     name = getattr(namespace, "__name__", source)
     place = str(file or name)

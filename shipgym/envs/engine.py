@@ -1,7 +1,7 @@
 """Many ships at once under a task, without Gymnasium's interface."""
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, ClassVar, NoReturn
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipgym.arrays import Flags, Floats
-from shipgym.checks import check_number, check_whole
+from shipgym.checks import check_flag, check_number, check_whole
 from shipgym.engine.compiling import entry_of
 from shipgym.engine.episode_program import EpisodeProgram, episode_program
 from shipgym.engine.episodes import BEGIN, BEGIN_NEXT, STEP, STEP_AND_BEGIN
@@ -131,14 +131,14 @@ class Engine(Lanes):
         except (IndexError, ArithmeticError, ValueError) as error:
             *_, asked = arguments
             begins = asked in (BEGIN, BEGIN_NEXT)
-            fault = fault_in_python(self.model, self.task) if begins else self._fault()
+            fault = fault_in_python(self.model, self.task) if begins else self.fault()
             if not fault:
                 functions = [place_of(one) for one in self.program.users_code]
                 places = "; ".join(sorted(functions))
                 fault = f"{type(error).__name__}: {error}, in one of these: {places}"
             raise InputError(fault) from None
 
-    def _fault(self) -> str:
+    def fault(self) -> str:
         """Say what fails in the last interval: in plain Python, which knows the line.
 
         It is empty where nothing does.
@@ -298,7 +298,7 @@ class Engine(Lanes):
         raise InputError(
             f"{self.task.definition.reward_source}: {name}: expected a finite number,"
             f" got {reward} in lane {lane} at step {step:g}; "
-            + (self._fault() or "look for a division by zero")
+            + (self.fault() or "look for a division by zero")
         )
 
     @property
@@ -333,10 +333,26 @@ def _check_ships(
         raise InputError(
             f"models: expected 1, or one for each of {num_envs} lanes, got {len(ships)}"
         )
-    _refuse_unstable(ships, allow_unstable)
     first = ships[0]
     if any(other.compiled is not first.compiled for other in ships):
         raise InputError("models: expected one structure in one engine, got several")
+    check_flag(allow_unstable, "allow_unstable")
+    for model in ships:
+        provenance = model.provenance or {}
+        if provenance.get("stable", True) is not False:
+            continue
+        found = (
+            f"model {model.name!r}: expected a stable ship, got one that was found"
+            " unstable when it was identified"
+        )
+        if not allow_unstable:
+            raise InputError(
+                f"{found}; identify it from more trials or with the guard, or give"
+                " allow_unstable=True to use it all the same"
+            )
+        warnings.warn(
+            f"{found}; do not trust what is learned or tuned on it", stacklevel=4
+        )
 
 
 def fault_in_python(model: ShipModel, task: Task) -> str:
@@ -358,6 +374,7 @@ def _first_step(model: ShipModel, task: Task) -> None:
     """Take a step in plain Python."""
     engine = Engine(model, 1, task, allow_unstable=True, loop=plain_loop)
     engine.step(np.zeros((1, task.n_commands)))
+    engine.shapes(0)
 
 
 def as_array(actions: Any) -> NDArray[Any]:
@@ -391,23 +408,3 @@ def episode_keys(seeds: ArrayLike) -> NDArray[np.uint64]:
 def episode_key(random: np.random.Generator) -> int:
     """Draw the key of an episode, the only draw from an environment's generator."""
     return int(random.integers(2**63))
-
-
-def _refuse_unstable(ships: Iterable[ShipModel], allow_unstable: bool) -> None:
-    """Refuse, or warn of, a model that was found unstable when it was identified."""
-    for model in ships:
-        provenance = model.provenance or {}
-        if provenance.get("stable", True) is not False:
-            continue
-        found = (
-            f"model {model.name!r}: expected a stable ship, got one that was found"
-            " unstable when it was identified"
-        )
-        if not allow_unstable:
-            raise InputError(
-                f"{found}; identify it from more trials or with the guard, or give"
-                " allow_unstable=True to use it all the same"
-            )
-        warnings.warn(
-            f"{found}; do not trust what is learned or tuned on it", stacklevel=4
-        )

@@ -147,7 +147,9 @@ class Lanes:
         sensors = self.program.sensors
         sensor_settings = task.sensor_settings
         if sensor_settings is None:
-            noise = bridge_noise(task.noise) if sensors.noise else {}
+            noise = {}
+            if sensors.noise:  # in multiples of that of a sea trial's sensors
+                noise = {name: task.noise * one for name, one in SEA_TRIAL.items()}
             sensor_settings = sensors.make_settings(noise)
         return [*flat(rules), *flat(sensor_settings)]
 
@@ -305,11 +307,6 @@ def _first_entries(rows: Sequence[int]) -> NDArray[np.int64]:
 def lanes_of(tiles: NDArray[Any]) -> NDArray[Any]:
     """Tiles with an axis for their lanes, shape (n_tiles, n_rows, 64), a view."""
     return tiles.reshape(len(tiles), -1, LANES)
-
-
-def bridge_noise(multiple: float) -> dict[str, float]:
-    """Settings of a bridge's noise, in multiples of that of a sea trial's sensors."""
-    return {name: multiple * deviation for name, deviation in SEA_TRIAL.items()}
 
 
 def ship_columns(

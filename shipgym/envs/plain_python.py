@@ -1,6 +1,6 @@
 """Episodes in plain Python that check results of functions of task and sensors."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from numbers import Integral, Real
 from traceback import walk_tb
@@ -15,20 +15,18 @@ from shipgym.engine.motion import Motion
 from shipgym.engine.records import LANES
 from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError
-from shipgym.python_files import asked, place_of, time_limit
+from shipgym.python_files import asked, place_of
 from shipgym.tasks.contract import Readings
 
-LONGEST_CALL = 5.0  # s, of a user's function
 #: Types of a number and of a boolean that a function returns.
 KINDS: dict[Any, Any] = {bool: np.bool_ | Integral, float: np.bool_ | Real}
 
 
 def plain_loop(
     program: EpisodeProgram,
-    hooks: Mapping[str, Callable[..., Any]] | None = None,
     function: Callable[..., Any] = episodes.run,
 ) -> Any:
-    """Return a loop of a program in plain Python, with `hooks` in place of its own.
+    """Return a loop of a program in plain Python.
 
     An error in a function of the task or the sensor set, or a result in another form
     than the contract's, is an InputError that names file, line and function.
@@ -45,7 +43,7 @@ def plain_loop(
         "readings": Readings,
     }
     checked = {name: _checked(program, name, form) for name, form in forms.items()}
-    run = plain(function, {**program.hooks, **checked, **(hooks or {})})
+    run = plain(function, {**program.hooks, **checked})
     # words of random numbers overflow, as they do when compiled
     return np.errstate(all="ignore")(run)
 
@@ -65,7 +63,7 @@ def fault_of_interval(
     tiles : int
         Number of tiles of lanes.
     """
-    judge = plain_loop(program, function=episodes.judge_again)
+    judge = plain_loop(program, episodes.judge_again)
     for number in range(tiles):
         try:
             judge(memory.copy(), number)
@@ -93,7 +91,7 @@ def _result_of(function: Any, reward: Any, form: Any, *arguments: Any) -> Any:
     """Call a function, and refuse a result in another form."""
     # NumPy's numbers fail as Python's own do
     numbers = np.errstate(divide="raise", invalid="raise")
-    with numbers, time_limit(LONGEST_CALL):
+    with numbers:
         given = asked(function, *arguments)
     fault = _fault(given, form, "returned value")
     if fault and reward is not None:

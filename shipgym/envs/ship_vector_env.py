@@ -73,7 +73,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         arguments = locals()
         mode = _mode(autoreset_mode)
         observation_space, action_space = self._make(arguments, VECTOR_OPTIONS)
-        check_once(self._engine.program, self.model, self.task, self.randomisation)
+        check_once(self._engine, self.randomisation)
         self.num_envs = int(num_envs)
         self.metadata = {
             "render_modes": ["rgb_array"],

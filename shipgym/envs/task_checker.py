@@ -3,16 +3,16 @@
 import warnings
 from collections.abc import Iterator
 from functools import partial
+from multiprocessing.pool import ThreadPool
 from time import monotonic
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.engine import episodes
 from shipgym.engine.cache import cached_path
-from shipgym.engine.episode_program import EpisodeProgram
 from shipgym.engine.fingerprint import fingerprint
 from shipgym.engine.specialise import loaded_names
 from shipgym.envs.engine import Engine
@@ -22,12 +22,11 @@ from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
 from shipgym.findings import Findings
 from shipgym.models import ShipModel
-from shipgym.python_files import asked, file_options, place_of
+from shipgym.python_files import LONGEST_CALL, NO_END, file_options, place_of, told
 from shipgym.tasks.definition import no_worst_cost
 from shipgym.tasks.task import Task
 
-STEPS = 400  # in plain Python, at most
-PLAIN_STEPS = 40  # of them, at least
+PLAIN_STEPS = 40  # in plain Python, at least
 PLAIN_SECONDS = 3.0  # more of them for so long
 PLAIN_LANES = 3
 MANY = 70  # ships, more than a tile
@@ -66,13 +65,12 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
         return TaskCheck(str(task), (str(error),))
 
 
-def check_once(
-    program: EpisodeProgram, model: ShipModel, task: Task, randomisation: Randomisation
-) -> None:
+def check_once(engine: Engine, randomisation: Randomisation) -> None:
     """Check a new task of a user's own: InputError, or a warning of wrong signs.
 
     A file in the cache folder stands for one that was sound.
     """
+    program, model, task = engine.program, engine.model, engine.task
     if not (program.users_code and task.checked):
         return
     content = fingerprint(episodes.run, program.hooks)
@@ -93,37 +91,34 @@ def check_once(
 
 def _checked(model: ShipModel, given: Task, randomisation: Randomisation) -> TaskCheck:
     """Check a task with a ship; InputError where it fails."""
-    made = partial(Engine, model, task=given, randomisation=randomisation)
-    plain = made(PLAIN_LANES, allow_unstable=True, loop=plain_loop)
+    made = partial(
+        Engine, model, task=given, randomisation=randomisation, allow_unstable=True
+    )
+    plain = made(PLAIN_LANES, loop=plain_loop)
     plain.shapes(0)
+    _refuse_prints(plain)
     _sail_in_python(plain)
-    many = made(MANY, allow_unstable=True)
+    many = made(MANY)
     sailed = _sailed(many)
-    remarks = list(_printed(many))
-    positive = list(_positive(many, sailed))
-    remarks += positive or _rare(sailed)
+    _sail_late(made(MANY))
+    remarks = list(_positive(many, sailed)) or list(_rare(sailed))
     remarks += _free_losses(given, sailed)
     return TaskCheck(given.name, tuple(sailed.faults.values()), tuple(remarks))
 
 
 def _sail_in_python(engine: Engine) -> None:
     """Sail ships in plain Python; InputError names line and step of an error there."""
-    ships = np.arange(engine.num_envs)
-    frequency = 0.11 * (1.0 + 0.3 * ships)
     end = monotonic() + PLAIN_SECONDS
-    for step in range(min(STEPS, engine.task.episode_steps)):
-        if step > PLAIN_STEPS and monotonic() > end:
-            return
-        # to and fro, hard over, and none
-        swing = np.sin(frequency * step + ships)
-        rudder = np.array([swing[0], np.sign(swing[1]), 0.0])
-        orders = np.repeat(rudder[:, None], engine.task.n_commands, axis=1)
-        try:
-            asked(engine.step, orders)
-        except InputError as error:
-            # the step distinguishes an error of the beginning from one of a rare event
-            where = f"at step {step + 1} in plain Python"
-            raise InputError(f"{error}, {where}") from error
+    step = 0
+    try:
+        for step, *_ in _steps(engine):
+            if step > PLAIN_STEPS and monotonic() > end:
+                return
+    except Exception as error:
+        fault = error if isinstance(error, InputError) else told(error)
+        # the step distinguishes an error of the beginning from one of a rare event
+        where = f"at step {step + 1} in plain Python"
+        raise InputError(f"{fault}, {where}") from error
 
 
 def _note_faults(faults: dict[str, str], engine: Engine, step: int) -> None:
@@ -133,8 +128,11 @@ def _note_faults(faults: dict[str, str], engine: Engine, step: int) -> None:
         if name in faults or not wrong.any():
             continue
         lane = int(np.argmax(wrong))
+        definition = engine.task.definition
+        of_reward = name.startswith("reward_")
+        source = definition.reward_source if of_reward else definition.source
         faults[name] = (
-            f"{_source_of(name, engine.task)}: {name}: expected a finite number,"
+            f"{source}: {name}: expected a finite number,"
             f" got {values[lane]} in lane {lane} at step {step}"
         )
 
@@ -153,18 +151,11 @@ def _numbers(engine: Engine) -> dict[str, NDArray[Any]]:
     return numbers
 
 
-def _source_of(name: str, task: Task) -> str:
-    """File that a number comes from, for messages."""
-    definition = task.definition
-    of_reward = name.startswith("reward_")
-    return definition.reward_source if of_reward else definition.source
-
-
-def _printed(engine: Engine) -> Iterator[str]:
-    """Remark on users' functions that print."""
+def _refuse_prints(engine: Engine) -> None:
+    """Refuse users' functions that print."""
     for function in engine.program.users_code:
         if "print" in loaded_names(function.__code__):
-            yield (
+            raise InputError(
                 f"{place_of(function)}: expected no print, which every ship would do in"
                 " every step, got one; take it out, and report what you want to see"
                 " with REPORTED"
@@ -180,23 +171,57 @@ class _Sailed(NamedTuple):
 
 
 def _sailed(engine: Engine) -> _Sailed:
-    """Sail ships up to their ends under random orders, each held for a while."""
-    random = np.random.default_rng(0)
+    """Sail ships up to their ends under random orders."""
     sailing = np.ones(MANY, dtype=np.bool_)
     earned, parts = [], []
     faults: dict[str, str] = {}
     _note_faults(faults, engine, 0)
-    for step in range(engine.task.episode_steps):
-        if step % HELD == 0:
-            orders = random.uniform(-1.0, 1.0, (MANY, engine.task.n_commands))
-        _, rewards, terminated, truncated = engine.step(orders)
-        _note_faults(faults, engine, step + 1)
+    for step, rewards, ended in _steps(engine):
+        _note_faults(faults, engine, step)
         earned.append(rewards[sailing])
         parts.append(engine.reward_parts[sailing])
-        sailing &= ~(terminated | truncated)
+        sailing &= ~ended
         if not sailing.any():
             break
     return _Sailed(np.concatenate(earned), np.concatenate(parts), faults)
+
+
+def _sail_late(engine: Engine) -> None:
+    """Sail at all times of an episode, at which lost ships do not arrive.
+
+    InputError for a function that does not return.
+    """
+    try:
+        for step, _, ended in _steps(engine):
+            engine.begin_next(ended)
+            engine.write("steps", step)
+    except InputError as error:
+        # other errors may come from a new episode at a late time
+        if NO_END in str(error):
+            raise
+
+
+def _steps(engine: Engine) -> Iterator[tuple[int, Floats, Flags]]:
+    """Take the steps of an episode; yield step, rewards, and which episodes ended.
+
+    Orders are random, each held for a while; the first ship steers straight ahead.
+    Another thread takes the steps, because compiled code cannot be stopped: InputError
+    names a function that does not return.
+    """
+    random = np.random.default_rng(0)
+    with ThreadPool(1) as pool:
+        for step in range(engine.task.episode_steps):
+            if step % HELD == 0:
+                size = (engine.num_envs, engine.task.n_commands)
+                orders = random.uniform(-1.0, 1.0, size)
+                orders[0] = 0.0
+            taken = pool.apply_async(engine.step, (orders,))
+            while not taken.ready():
+                taken.wait(2.0 * LONGEST_CALL)  # in plain Python it ends itself
+                if not taken.ready() and (fault := engine.fault()):
+                    raise InputError(fault)
+            _, rewards, terminated, truncated = taken.get()
+            yield step + 1, rewards, terminated | truncated
 
 
 def _free_losses(task: Task, sailed: _Sailed) -> Iterator[str]:

@@ -221,7 +221,7 @@ def read_ship_equations(path: str | Path) -> ShipEquations:
     """
     path = Path(path).resolve()
     expected = "SHIP = ShipEquations(...)"
-    module = load_file(path, f"a Python file that defines {expected}")
+    module = asked(load_file, path, f"a Python file that defines {expected}")
     ship = getattr(module, "SHIP", None)
     if not isinstance(ship, ShipEquations):
         raise unexpected(str(path), expected, ship)

@@ -76,10 +76,9 @@ def shapes_of(draw: Any, *arguments: Any) -> tuple[Shape, ...]:
         if error.__cause__ is not None:  # it names the place
             raise
         raise InputError(f"{place_of(draw, error)}: {error}") from None
-    expected = "a list of Line, Circle, ShipOutline and ChartWidth"
-    if not isinstance(shapes, Sequence):
-        raise unexpected(place_of(draw), expected, shapes)
-    for shape in shapes:
+    listed = shapes if isinstance(shapes, Sequence) else [shapes]
+    for shape in listed:
         if not isinstance(shape, Shape):
+            expected = "a list of Line, Circle, ShipOutline and ChartWidth"
             raise unexpected(place_of(draw), expected, shape)
-    return tuple(shapes)
+    return tuple(listed)

@@ -8,7 +8,15 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from shipgym.checks import check_choice, check_keys, check_number, check_whole
+from shipgym.checks import bounded as bounded_number
+from shipgym.checks import (
+    check_choice,
+    check_flag,
+    check_keys,
+    check_number,
+    check_whole,
+    keep_numbers,
+)
 from shipgym.engine.lane_records import CONSTRAINT
 from shipgym.engine.motion import Ship
 from shipgym.errors import InputError
@@ -117,16 +125,16 @@ class Task:
     definition: TaskDefinition
     settings: Any
     sea: Sea | Sequence[Sea] = "calm"
-    dt: float | None = None
+    dt: float | None = bounded_number(None, above=0.0)
     episode_steps: int = 600
-    max_envelope_distance: float = 5.0
+    max_envelope_distance: float = bounded_number(5.0, at_least=1.0)
     action: str = "rudder"
     roll: bool = False
-    noise: float = 0.0
+    noise: float = bounded_number(0.0, at_least=0.0)
     measurement: str = "raw"
     water_depth: float = float("inf")
     bounded: bool | float = True
-    loss_horizon: float | None = None
+    loss_horizon: float | None = bounded_number(None, at_least=0.0)
     checked: bool = True
     sensors: SensorSet | None = None
     sensor_settings: Any = None
@@ -135,14 +143,13 @@ class Task:
     def __post_init__(self) -> None:
         if not self.seas:
             raise InputError("sea: expected at least one, got none")
-        if self.dt is not None:
-            check_number(self.dt, "dt", above=0.0)
+        keep_numbers(self)
         check_whole(self.episode_steps, "episode_steps", at_least=1)
-        check_number(self.max_envelope_distance, "max_envelope_distance", at_least=1.0)
+        for name in ("roll", "checked"):
+            check_flag(getattr(self, name), name)
         check_choice(self.action, ACTIONS, "action")
         measurements = ("raw", "filtered")
         check_choice(self.measurement, measurements, "measurement")
-        check_number(self.noise, "noise", at_least=0.0)
         if not isinstance(self.bounded, bool):
             check_number(
                 self.bounded,
@@ -150,8 +157,6 @@ class Task:
                 above=0.0,
                 hint="or True or False",
             )
-        if self.loss_horizon is not None:
-            check_number(self.loss_horizon, "loss_horizon", at_least=0.0)
         if self.sensors is not None and (self.noise > 0.0 or self.measurement != "raw"):
             raise InputError(
                 "sensors: expected either these or noise and measurement, got"

@@ -29,16 +29,14 @@ def fairway(folder, lines, *changes):
 
 
 def late(folder):
-    """Fairway that fails at two orders of the rudder, prints, and pays a bonus."""
+    """Fairway that fails at two orders of the rudder, and pays a bonus."""
     return fairway(
         folder,
         """    rudder = interval.rudder_command
     index = 1000000000000 if fabs(rudder - 0.43) < 1e-6 else 0
     zero = 0.0 if fabs(rudder - 0.77) < 1e-6 else 1.0
     TABLE[index]
-    bad = motion.u / zero
-    if motion.x < -1e9:
-        print(bad)""",
+    bad = motion.u / zero""",
         ("Reward(-off * off, -delay", "Reward(1.0, -delay - 1e-9 * bad"),
     )
 
@@ -73,39 +71,81 @@ def test_what_fails_late_is_told_with_line_lane_and_step(tmp_path, monkeypatch):
         sail(ships, 0.77)
 
 
-def test_positive_rewards_and_prints_are_asked_about(tmp_path):
+def test_positive_rewards_are_asked_about(tmp_path):
     path, _ = late(tmp_path)
     found = check_task(path, **SHIP)
-    assert "problems: none, remarks: 2" in str(found)
-    printed, positive = found.remarks
-    assert "in step: expected no print" in printed
+    assert "problems: none, remarks: 1" in str(found)
+    (positive,) = found.remarks
     assert "reward_cross_track: expected costs, written with a minus" in positive
     assert "100 % of the steps, up to 1: are these costs?" in positive
 
 
-def test_a_vector_environment_checks_a_new_task(tmp_path):
-    path, line = fairway(tmp_path, "    TABLE[int(interval.steps / 9.0)]")
-    message = (
-        rf"line {line}, in step: IndexError: index 3 .* at step 27 in plain Python"
-    )
+@pytest.fixture
+def short(monkeypatch):
+    """Calls of a user's function may take a fifth of a second."""
+    for module in ("python_files", "envs.task_checker"):
+        monkeypatch.setattr(f"shipgym.{module}.LONGEST_CALL", 0.2)
+
+
+def check_refused(path, message, make):
+    """A check names what is wrong, and an environment is not made."""
+    (problem,) = check_task(path, **SHIP).problems
+    assert re.search(message, problem)
     with pytest.raises(InputError, match=message):
-        gymnasium.make_vec(COURSE, num_envs=3, task=path, **SHIP)
+        make(COURSE, task=path, **SHIP)
 
 
-def test_a_loop_that_does_not_end_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("shipgym.envs.plain_python.LONGEST_CALL", 0.2)
-    path, line = fairway(tmp_path, "    while motion.x < 1e9:\n        pass")
-    message = rf"line ({line}|{line + 1}), in step: TimeoutError: .* does not end"
-    with pytest.raises(InputError, match=message):
-        gymnasium.make(COURSE, task=path, **SHIP)
+def test_a_print_is_refused_before_ships_sail(tmp_path, capsys):
+    path, _ = fairway(tmp_path, "    print(motion.x)")
+    assert "in step: expected no print" in check_task(path, **SHIP).problems[0]
+    assert len(capsys.readouterr().out.splitlines()) < 9
 
 
-def test_attributes_of_functions_are_read_at_the_top(tmp_path):
-    head = "def helm(x):\n    return x\n\n\nREPORTED"
-    path, line = fairway(tmp_path, "    helm.start", ("REPORTED", head))
-    message = rf"line {line}, in step: .* got helm.start; write START = helm.start"
-    with pytest.raises(InputError, match=message):
-        gymnasium.make(COURSE, task=path, **SHIP)
+LOOP = "    k = 0.0\n    while {} and k < 3e9:\n        k += 1.0"  # compiled, it ends
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (
+            "    k = TABLE[int(interval.steps / 9.0)]",
+            "IndexError: index 3 .* at step 27 in",
+        ),
+        (LOOP.format("interval.steps > 579.5"), "TimeoutError: .* does not end"),
+        (LOOP.format("motion.psi > 1.0"), "TimeoutError: .* does not end"),
+    ],
+)
+def test_a_new_task_is_checked_over_an_episode(tmp_path, short, lines, message):
+    path, _ = fairway(tmp_path, lines, ("(-off", "(-0.0 * k - off"))
+    check_refused(path, f"in step: {message}", gymnasium.make_vec)
+
+
+@pytest.mark.parametrize(
+    ("lines", "head", "message"),
+    [
+        (
+            "helm.start",
+            "def helm(x):\n    return x",
+            "got helm.start; write START = helm",
+        ),
+        (
+            "if motion.x < 8e9:\n        late = 1.0\n    motion.u * late",
+            "",
+            r"line \d+\): expected variables that .* got 'late'",
+        ),
+        ("0.0", "while True:\n    pass", "look for a loop that does not end"),
+        (
+            "0.0",
+            "def draw(motion, state, ship, settings):\n    while True:\n        pass",
+            "line 2., in draw: TimeoutError: expected a function that returns",
+        ),
+    ],
+)
+def test_what_no_environment_is_made_of(tmp_path, short, lines, head, message):
+    change = ("REPORTED", f"{head}\n\n\nREPORTED")
+    path, _ = fairway(tmp_path, f"    {lines}", change)
+    check_refused(path, message, gymnasium.make)
 
 
 @pytest.mark.skipif(not CASES.is_dir(), reason="the cases are not beside the checkout")
@@ -122,11 +162,3 @@ def test_attributes_of_functions_are_read_at_the_top(tmp_path):
 def test_slips_of_users_are_told_with_their_line(name, message):
     (problem,) = check_task(CASES / f"{name}.py", dt=10.0, **SHIP).problems
     assert re.search(message, problem)
-
-
-def test_a_variable_that_may_be_unset_is_refused_with_its_line(tmp_path):
-    lines = "    if motion.x < 300.0:\n        late = 1.0\n    motion.u * late"
-    path, line = fairway(tmp_path, lines)
-    message = rf"fairway.py, line {line + 2}\): expected variables that .* got 'late'"
-    with pytest.raises(InputError, match=message):
-        gymnasium.make(COURSE, task=path, **SHIP)
