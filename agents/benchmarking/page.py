@@ -25,6 +25,7 @@ METRICS = {
     "outside_corridor": "share of time outside corridor",
     "violated_heel": "share of time beyond the heel allowed",
     "violated_clearance": "share of time too close to others",
+    "terminated": "share of ships lost",
     "success": "share of success",
 }
 STATISTICS = {"mean": "mean", "p95": "95th percentile"}

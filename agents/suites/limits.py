@@ -20,6 +20,9 @@ LIMITED_FIGURES = {
     "heel_deg": "p95",
     "outside_corridor": "mean",
     "speed_lost_percent": "mean",
+    "violated_heel": "mean",
+    "violated_clearance": "mean",
+    "terminated": "mean",
 }
 
 
