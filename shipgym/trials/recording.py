@@ -123,7 +123,7 @@ def _read_numbers(locator: Locator, notes: list[str]) -> dict[str, Floats]:
     if "sog" in channels:  # at rest there is no course
         sog = channels["sog"]
         cog = channels["cog"]
-        lacks_one = np.isnan(sog + cog)
+        lacks_one = np.isnan(sog) | np.isnan(cog)
         sog[lacks_one] = np.nan
         cog[lacks_one] = np.nan
     return channels
