@@ -107,6 +107,7 @@ def _settle_speed(chosen: dict[str, Column]) -> list[str]:
     ]
 
 
+@np.errstate(invalid="ignore")  # of signalling nan in binary files
 def _read_numbers(locator: Locator, notes: list[str]) -> dict[str, Floats]:
     """Channels that are numbers in the file, in SI units, nan where there is none.
 

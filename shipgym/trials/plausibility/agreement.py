@@ -18,6 +18,7 @@ from shipgym.trials.units import DEGREE, fitting_units
 _WINDOW = 10.0  # s, over which positions and headings change by more than noise
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of clocks that hardly move
 def turning_gain(
     t: Floats, psi: Floats, swept: Floats, *, has_bias: bool = True
 ) -> float:
