@@ -263,9 +263,9 @@ def check_finite(values: Any, where: str, hint: str = "") -> NDArray[np.float64]
     """Return `values` as a read-only copy; they must be finite numbers."""
     try:
         given = np.array(values)
-        array = given.astype(np.float64)
-        if given.dtype.kind in "USb":
+        if given.dtype.kind in "USbc":  # texts, booleans, complex numbers
             raise TypeError
+        array = given.astype(np.float64)
     except (TypeError, ValueError, OverflowError):
         raise unexpected(where, "an array of numbers", values) from None
     wrong = np.argwhere(~np.isfinite(array))

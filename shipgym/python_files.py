@@ -16,7 +16,7 @@ from typing import Any
 from shipgym.checks import check_table
 from shipgym.errors import InputError
 
-LONGEST_CALL = 5.0  # s, of a user's function
+LONGEST_CALL = 10.0  # s, of a user's function
 LONGEST_PAUSE = 0.1  # s of it that a call of a library counts as, at most
 NO_END = "look for a loop that does not end"
 #: Where code is that is not a user's own.

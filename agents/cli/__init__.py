@@ -44,6 +44,7 @@ try:
 except KeyboardInterrupt:  # Ctrl-C before any command began
     sys.exit(130)
 
+ENDING = (signal.SIGINT, signal.SIGTERM)
 PATIENCE = 5.0  # s until a process that does not hear Ctrl-C ends
 
 app = typer.Typer(
@@ -167,15 +168,17 @@ def _listen() -> None:
         raise KeyboardInterrupt
 
     def listen() -> None:
-        ears.recv(1)
+        while ears.recv(1)[0] not in ENDING:
+            continue
         if not heard.wait(PATIENCE):
             os.write(2, b"Error: interrupted in a loop that does not end\n")
             os._exit(INTERRUPTED)
 
     mouth.setblocking(False)
     signal.set_wakeup_fd(mouth.detach())  # told at once, whatever Python does
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, interrupt)
+    for number in ENDING:
+        if signal.getsignal(number) != signal.SIG_IGN:  # as of a job in the background
+            signal.signal(number, interrupt)
     Thread(target=listen, daemon=True).start()
 
 

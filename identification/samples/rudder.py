@@ -379,7 +379,8 @@ def _settling_lag(trials: Sequence[Trial], rate: float) -> float:
     Where the rudder has slowed down to half the rate, half of rate times lag is left to
     go. 0 where the median of that does not differ from what a gear without lag has to
     go in its last sampling step: an eighth of a step on average, up to a half where all
-    moves end at the same part of a step.
+    moves end at the same part of a step; and 0 beyond 2 s, where the order itself
+    changes slowly.
     """
     left = list[float]()
     step = 0.0
@@ -398,7 +399,8 @@ def _settling_lag(trials: Sequence[Trial], rate: float) -> float:
     spread = high - low
     on_average = 0.125 * rate * step + 3.0 * spread / np.sqrt(len(left))
     in_step = 0.5 * rate * step - spread
-    if middle <= max(on_average, in_step):
+    longest = 2.0  # s
+    if not max(on_average, in_step) < middle < 0.5 * rate * longest:
         return 0.0
     return float(2.0 * middle / rate)
 

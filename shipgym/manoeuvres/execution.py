@@ -31,8 +31,9 @@ def usual_rudder(trial: Trial) -> float:
 
 def first_held(trial: Trial) -> int:
     """Sample from which the rudder is held; smaller angles on the approach are not."""
-    least = 0.5 * usual_rudder(trial)
-    return int(np.argmax(np.abs(rudder(trial)) > least))
+    angles = np.abs(rudder(trial))
+    least = 0.5 * np.percentile(angles, 98)
+    return int(np.argmax(angles > least))
 
 
 def execute_time(trial: Trial) -> float:

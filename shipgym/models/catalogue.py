@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from os import PathLike
 from os.path import exists
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -170,14 +171,14 @@ def load_model(name: Any) -> ShipModel:
         return name
     if isinstance(name, Mapping):
         return ShipModel.from_dict(name)
-    if not isinstance(name, str | Path):
+    if not isinstance(name, str | PathLike):
         expected = "a name, the path of a model file, or a ShipModel"
         raise unexpected("model", expected, name)
     path = Path(name)
     if path.suffix == ".py":
         return model_of(register_ship_equations(path))
     models = list_models()
-    is_path = isinstance(name, Path) or path.suffix == ".json" or exists(path)
+    is_path = isinstance(name, PathLike) or path.suffix == ".json" or exists(path)
     if name not in models and is_path:
         return ShipModel.load(path)
     known = check_choice(name, models, "model (a name, or the path of a model file)")

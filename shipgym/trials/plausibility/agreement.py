@@ -227,12 +227,13 @@ def check_over_ground(log: Log, conventions: Conventions, locator: Locator) -> N
 def _is_unrelated(t: Floats, psi: Floats, course: Floats) -> bool:
     """Return whether a course goes round without the heading, which moves otherwise.
 
-    Without jumps, rad. A heading that stands still does not make it worse.
+    Without jumps, rad. A heading that stands still, as that of a ferry, does not make
+    it worse.
     """
     goes_round = np.ptp(course) > np.ptp(psi) + math.pi
     _, turned, expected = changes(t, _WINDOW, psi, course)
     left = np.linalg.norm(expected - turned)
-    return bool(goes_round and left > np.linalg.norm(expected))
+    return bool(goes_round and left > 1.05 * np.linalg.norm(expected))
 
 
 def check_track(log: Log, locator: Locator) -> None:
