@@ -131,6 +131,7 @@ def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
     # typical time of a loop on a laptop
     tell_who_waits(f"shipgym: compiling {what}, once, about 7 s")
     specialised = _named(Compilation(hooks).copy(loop))
+    known = set(SHARED)
     before = numba.config.ALWAYS_WARN_UNINIT_VAR
     # Python fails where an unset variable is used; compiled code takes a 0 for it
     numba.config.ALWAYS_WARN_UNINIT_VAR = int(hooks.get("CHECKED", True))
@@ -149,7 +150,8 @@ def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
         AttributeError,
         NotImplementedError,
     ) as error:
-        SHARED.clear()  # Numba tells of an unset variable once
+        for key in SHARED.keys() - known:  # Numba tells of an unset variable once
+            del SHARED[key]
         raise InputError(explanation(error, what)) from None
     finally:
         numba.config.ALWAYS_WARN_UNINIT_VAR = before
