@@ -130,8 +130,8 @@ def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
 
     # typical time of a loop on a laptop
     tell_who_waits(f"shipgym: compiling {what}, once, about 7 s")
-    specialised = _named(Compilation(hooks).copy(loop))
     known = set(SHARED)
+    specialised = _named(Compilation(hooks).copy(loop))
     before = numba.config.ALWAYS_WARN_UNINIT_VAR
     # Python fails where an unset variable is used; compiled code takes a 0 for it
     numba.config.ALWAYS_WARN_UNINIT_VAR = int(hooks.get("CHECKED", True))
